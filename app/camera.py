@@ -1,0 +1,139 @@
+"""Where the camera must stand so that a lesson fills the canvas, and whether the user has moved it."""
+
+import math
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from app.scenario import CameraPose
+from lessons.kit.scene import Camera, Orbit, Plane
+
+PLANE_FOV = math.radians(5.0)  # nearly parallel: a plane looks like a plot on paper
+ORBIT_FOV = math.radians(32.0)
+# Pixels kept free at left, right, top and bottom of a plane view, for the numbers on its axes and the caption.
+MARGINS = (74.0, 26.0, 66.0, 64.0)
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """A complete camera: scene units, vertical field of view in radians."""
+
+    position: tuple[float, float, float]
+    look_at: tuple[float, float, float]
+    up: tuple[float, float, float]
+    fov: float
+
+    @property
+    def distance(self) -> float:
+        return math.dist(self.position, self.look_at)
+
+    @property
+    def visible_height(self) -> float:
+        """Height of what is seen at the distance of `look_at`, in scene units."""
+        return 2 * self.distance * math.tan(self.fov / 2)
+
+    def wxyz(self) -> np.ndarray:
+        """The orientation as a quaternion: looking along +z, down is +y (OpenCV)."""
+        from core.rotation import rotation_vector_from_dcm
+
+        forward = np.subtract(self.look_at, self.position) / self.distance
+        right = np.cross(forward, self.up)
+        right /= np.sqrt(right @ right)
+        p = rotation_vector_from_dcm(np.stack([right, np.cross(forward, right), forward], axis=1))
+        angle = float(np.sqrt(p @ p))
+        axis = p / angle if angle > 0 else p
+        return np.array([math.cos(angle / 2), *(math.sin(angle / 2) * axis)])
+
+
+def fit(camera: Camera, width: float, height: float, margin_scale: float = 1.0) -> Pose:
+    """The pose that shows all of `camera` on a canvas of this size in pixels.
+
+    margin_scale: enlargement of the text round a plane view.
+    """
+    if isinstance(camera, Orbit):
+        half = math.atan(math.tan(ORBIT_FOV / 2) * min(1.0, width / height))
+        distance = camera.radius / math.sin(half)
+        azimuth, elevation = math.radians(camera.azimuth_deg), math.radians(camera.elevation_deg)
+        direction = (math.cos(elevation) * math.cos(azimuth), math.cos(elevation) * math.sin(azimuth),
+                     math.sin(elevation))
+        position = tuple(c + distance * d for c, d in zip(camera.centre, direction, strict=True))
+        return Pose(position, camera.centre, (0.0, 0.0, 1.0), ORBIT_FOV)  # type: ignore[arg-type]
+    small = margin_scale * min(1.0, width / 560, height / 560)
+    left, right, top, bottom = (m * small if camera.axes else 8.0 for m in MARGINS)
+    (x0, x1), (y0, y1) = camera.x, camera.y
+    scale = max(min((width - left - right) / (x1 - x0), (height - top - bottom) / (y1 - y0)), 1e-12)
+    x = (x0 + x1) / 2 - (left - right) / 2 / scale
+    y = (y0 + y1) / 2 - (bottom - top) / 2 / scale
+    distance = height / scale / 2 / math.tan(PLANE_FOV / 2)
+    return Pose((x, y, distance), (x, y, 0.0), (0.0, 1.0, 0.0), PLANE_FOV)
+
+
+def moved(camera: Camera, where: CameraPose) -> Pose:
+    """The pose that the user chose, with the lesson's upright and field of view."""
+    plane = isinstance(camera, Plane)
+    return Pose(where.position, where.look_at, (0.0, 1.0, 0.0) if plane else (0.0, 0.0, 1.0),
+                PLANE_FOV if plane else ORBIT_FOV)
+
+
+class CameraController:
+    """Sets one client's camera, and notices when the user moves it."""
+
+    def __init__(self, client: Any) -> None:
+        self._client = client
+        self._sent: Pose | None = None
+        self._arrived = False  # a slow browser reports older poses for a while
+
+    @property
+    def canvas(self) -> tuple[int, int]:
+        """Width and height of the client's canvas in pixels."""
+        camera = self._client.camera
+        return max(int(camera.image_width), 1), max(int(camera.image_height), 1)
+
+    def pose(self, camera: Camera, chosen: CameraPose | None) -> Pose:
+        """Where the camera should be now."""
+        return fit(camera, *self.canvas) if chosen is None else moved(camera, chosen)
+
+    def show(self, camera: Camera, chosen: CameraPose | None) -> None:
+        """Move the client's camera there, unless it has been sent there before."""
+        pose = self.pose(camera, chosen)
+        if pose == self._sent:
+            return
+        handle, distance = self._client.camera, pose.distance
+        handle.max_orbit_distance = 20 * distance
+        handle.min_orbit_distance = 1e-4 * distance
+        handle.near, handle.far = distance / 100, distance * 30
+        handle.fov = pose.fov
+        handle.up_direction = pose.up
+        handle.position = pose.position
+        handle.look_at = pose.look_at
+        self._sent, self._arrived = pose, False
+
+    def user_pose(self) -> CameraPose | None:
+        """The client's pose if the user has moved the camera away from where we put it."""
+        if self._sent is None:
+            return None
+        camera = self._client.camera
+        try:
+            position, look_at = (np.asarray(v, dtype=np.float64) for v in (camera.position, camera.look_at))
+        except (TypeError, ValueError):
+            return None
+        if position.shape != (3,) or look_at.shape != (3,) or not np.isfinite([position, look_at]).all():
+            return None
+        slack = 2e-3 * self._sent.distance
+        if np.abs(position - self._sent.position).max() < slack and np.abs(look_at - self._sent.look_at).max() < slack:
+            self._arrived = True
+            return None
+        if not self._arrived:
+            return None
+        if np.abs(position - look_at).max() < 1e-9:
+            return None
+        return CameraPose(tuple(position.tolist()), tuple(look_at.tolist()))
+
+    def stale(self, camera: Camera) -> bool:
+        """Whether the fitted pose is not the one that was sent, because the canvas has changed."""
+        return self._sent is not None and fit(camera, *self.canvas) != self._sent
+
+    def accept(self, chosen: CameraPose, camera: Camera) -> None:
+        """Remember that the client is at `chosen` already."""
+        self._sent, self._arrived = moved(camera, chosen), True

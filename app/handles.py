@@ -1,0 +1,109 @@
+"""Points that the user drags in the scene: the ray under the pointer meets the point's plane or sphere."""
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from app.controls import Change
+from app.draw.primitives import Style
+from core.types import Array
+from lessons.kit.params import Parameter, values
+
+RADIUS = 9.0  # pixels of the standard picture
+
+
+def target(kind: str, start: Array, origin: Array, through: Array) -> Array | None:
+    """Where the ray from `origin` through `through` meets what the point may move on; None when it does not.
+
+    kind "xy": the horizontal plane through start; "sphere": the sphere round the scene's origin through start (its
+    nearest point where the ray passes by); "free": the point `through` itself.  All shapes (3,), scene units.
+    """
+    direction = through - origin
+    size = np.sqrt(direction @ direction)
+    if not np.isfinite(size) or size < 1e-12:
+        return None
+    direction = direction / size
+    if kind == "free":
+        return through
+    if kind == "xy":
+        if abs(direction[2]) < 1e-6:
+            return None
+        along = (start[2] - origin[2]) / direction[2]
+        return origin + along * direction if along > 0 else None
+    radius = np.sqrt(start @ start)
+    middle = -(origin @ direction)
+    closest = origin + middle * direction
+    gap = radius**2 - closest @ closest
+    found = closest if gap <= 0 else origin + (middle - np.sqrt(gap)) * direction
+    length = np.sqrt(found @ found)
+    return found * (radius / length) if length > 1e-12 else None
+
+
+class Handles:
+    """One ball for each draggable point of a lesson; its drags become changes of the scenario."""
+
+    def __init__(self, client: Any, parameters: Mapping[str, Parameter], change: Change) -> None:
+        self._client = client
+        self._change = change
+        self._parameters = {name: p for name, p in parameters.items() if p.kind == "point"}
+        self._balls: dict[str, Any] = {}
+        self._drawn: dict[str, tuple[Any, ...]] = {}
+
+    def show(self, params: Any, style: Style) -> None:
+        """Put the balls where the parameters say."""
+        current = values(params)
+        for name, parameter in self._parameters.items():
+            at = _in_space(current[name], style, parameter)
+            color, radius = style.theme.color(parameter.role), RADIUS * style.pixel * style.enlarge
+            if self._drawn.get(name) != (color, radius):
+                self._discard(name)
+                ball = self._client.scene.add_icosphere(f"/handle.{name}", radius, color, subdivisions=2,
+                                                        position=at, cast_shadow=False, receive_shadow=False)
+                self._listen(parameter, ball)
+                self._balls[name], self._drawn[name] = ball, (color, radius)
+            else:
+                self._balls[name].position = at
+
+    def remove(self) -> None:
+        for name in list(self._balls):
+            self._discard(name)
+
+    @property
+    def names(self) -> list[str]:
+        return [f"handle.{name}" for name in self._balls]
+
+    def _discard(self, name: str) -> None:
+        self._drawn.pop(name, None)
+        ball = self._balls.pop(name, None)
+        if ball is not None:
+            ball.remove()
+
+    def _listen(self, parameter: Parameter, ball: Any) -> None:
+        digits = _digits(parameter)
+
+        async def dragged(event: Any) -> None:
+            origin = np.asarray(self._client.camera.position, dtype=np.float64)
+            start = np.asarray(ball.position, dtype=np.float64)
+            through = np.asarray(event.end_position, dtype=np.float64)
+            if through.shape != (3,) or not np.isfinite([origin, through]).all():
+                return
+            found = target(parameter.plane, start, origin, through)
+            if found is None:
+                return
+            n = len(parameter.default)  # type: ignore[arg-type]
+            point = tuple(round(float(v), digits) for v in found[:n])
+            self._change({parameter.name: parameter.nearest(point)})
+
+        ball.on_drag("left")(dragged)
+
+
+def _in_space(point: Any, style: Style, parameter: Parameter) -> tuple[float, float, float]:
+    x, y, *z = point
+    # above the flat layers of a plane view
+    return (x, y, z[0] if z else (40 * style.pixel if style.layered else 0.0))
+
+
+def _digits(parameter: Parameter) -> int:
+    """Decimals that resolve about a thousandth of the range."""
+    return max(0, 3 - int(np.floor(np.log10(parameter.high - parameter.low))))

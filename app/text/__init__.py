@@ -1,0 +1,1 @@
+"""Words and formulas become HTML that needs nothing from the network."""

@@ -1,0 +1,183 @@
+"""Everything that reaches behind viser's public interface, pinned to 1.1.1; `tests/app/test_adapter.py` is its contract.
+
+Why each is needed: viser listens to any origin, opens public tunnels on a client's word, lets a client set any
+attribute of a widget, and has no way to read or write the page's address.
+"""
+
+import contextlib
+import http
+import json
+import logging
+import math
+import secrets
+from collections.abc import Callable, Iterator
+from functools import cache, partial
+from pathlib import Path
+from typing import Any
+from urllib.parse import urlsplit
+
+import viser
+import viser._messages as messages
+import websockets.asyncio.server
+from viser.infra import _infra
+from websockets.datastructures import Headers
+from websockets.http11 import Request, Response
+
+from app.scenario import VIEWER_NAMES
+
+log = logging.getLogger(__name__)
+
+MAX_MESSAGE_BYTES = 48 * 1024 * 1024  # a picture of 3840 x 2160 comes back as one message
+HERE = Path(__file__).parent
+LOOPBACK = frozenset({"127.0.0.1", "localhost", "::1", "[::1]"})
+
+_UNWANTED = (
+    messages.ShareUrlRequest, messages.ShareUrlDisconnect, messages.GuiFormSubmitMessage,
+    messages.GuiFormDirtyMessage, messages.FileTransferStartUpload, messages.FileTransferPart,
+)
+
+
+def start_server(host: str, port: int, hosts: frozenset[str] = LOOPBACK) -> viser.ViserServer:
+    """A viser server that answers only requests for `hosts`, and websockets only from its own pages.
+
+    port 0 takes any free one.  The share, form and upload messages have no handlers.
+    """
+    with _guarded_serve(hosts):
+        server = viser.ViserServer(host=host, port=port, label="Paikka", verbose=False)
+    _forget(server._websock_server)
+    server._websock_server.queue_message(messages.RunJavascriptMessage(source=_plotly_js()))
+    return server
+
+
+def prepare_client(client: viser.ClientHandle) -> None:
+    """Close the same doors of one client, and run our script in its page."""
+    connection = client._websock_connection
+    _forget(connection)
+    for kind, ours in ((messages.GuiUpdateMessage, _checked_update(client)),
+                       (messages.GuiButtonHoldMessage, None)):
+        connection.unregister_handler(kind)
+        if ours is not None:
+            connection.register_handler(kind, ours)
+    client.gui._setup_plotly_js = True  # broadcast once at the start, for all clients
+    run_script(client, _page_js())
+
+
+def run_script(client: viser.ClientHandle, source: str) -> None:
+    """Run JavaScript in the page; build it with json.dumps, never by pasting text."""
+    client._websock_connection.queue_message(messages.RunJavascriptMessage(source=source))
+
+
+def call_page(client: viser.ClientHandle, function: str, *arguments: object) -> None:
+    """window.paikka.<function>(arguments)."""
+    run_script(client, f"window.paikka.{function}({', '.join(json.dumps(a) for a in arguments)})")
+
+
+def read_query(client: viser.ClientHandle, timeout: float = 5.0) -> str:
+    """The page's query string as it was when the page opened; empty when the browser does not tell."""
+    key = f"paikka-{secrets.token_hex(8)}"
+    run_script(client, f"localStorage.setItem({json.dumps('viser-user:' + key)}, window.paikka.search)")
+    try:
+        return client.local_storage.get_item(key, timeout=timeout) or ""
+    except (RuntimeError, TimeoutError) as error:
+        log.warning("could not read the page's address: %s", error)
+        return ""
+    finally:
+        client.local_storage.remove_item(key)
+
+
+def widget_id(handle: Any) -> str:
+    """The id of the widget's element in the page."""
+    return str(handle._impl.uuid)
+
+
+def is_connected(client: viser.ClientHandle) -> bool:
+    return client.client_id in client._viser_server._connected_clients
+
+
+@contextlib.contextmanager
+def _guarded_serve(hosts: frozenset[str]) -> Iterator[None]:
+    """While a server is made, its listener gets our request check, message size and origin rule."""
+    original = websockets.asyncio.server.serve
+
+    def serve(handler: Any, host: str, port: int, **options: Any) -> Any:
+        options["max_size"] = MAX_MESSAGE_BYTES
+        options["process_request"] = partial(_check_request, hosts, options.get("process_request"))
+        return original(handler, host, port, **options)
+
+    _infra.websockets.asyncio.server.serve = serve
+    try:
+        yield
+    finally:
+        _infra.websockets.asyncio.server.serve = original
+
+
+def _check_request(hosts: frozenset[str], inner: Callable[..., Any], connection: Any, request: Request) -> Any:
+    """403 for a Host that is not ours (DNS rebinding) and for a websocket from another site's page."""
+    host = request.headers.get("Host", "")
+    origin = request.headers.get("Origin")
+    if "*" not in hosts and _name(host) not in hosts:
+        return _refuse(f"this server does not answer for {host[:80]!r}")
+    if origin is not None and urlsplit(origin).netloc != host:
+        return _refuse(f"pages of {origin[:80]!r} may not use this server")
+    return inner(connection, request)
+
+
+def _name(host: str) -> str:
+    return (host.rpartition("]")[0] + "]" if host.startswith("[") else host.partition(":")[0]).lower()
+
+
+def _refuse(reason: str) -> Response:
+    log.warning("refused a request: %s", reason)
+    body = (reason + "\n").encode()
+    headers = Headers({"Content-Type": "text/plain; charset=utf-8", "Content-Length": str(len(body))})
+    return Response(http.HTTPStatus.FORBIDDEN, "Forbidden", headers, body)
+
+
+def _forget(connection: Any) -> None:
+    for kind in _UNWANTED:
+        if kind in connection._incoming_handlers:
+            connection.unregister_handler(kind)
+
+
+def _checked_update(client: viser.ClientHandle) -> Callable[..., Any]:
+    """A widget update that sets `value` only, to something finite of the type it has."""
+    inner = client.gui._handle_gui_updates
+
+    async def handle(client_id: int, message: messages.GuiUpdateMessage) -> None:
+        widget = client.gui._gui_input_handle_from_uuid.get(message.uuid)
+        if widget is None or set(message.updates) != {"value"}:
+            return
+        if not acceptable(widget._impl.value, message.updates["value"]):
+            log.warning("client %s: ignored the value %.80r of a widget", client_id, message.updates["value"])
+            return
+        await inner(client_id, message)
+
+    return handle
+
+
+def acceptable(current: object, new: object) -> bool:
+    """Whether a widget that shows `current` may be set to `new` by a browser."""
+    if isinstance(current, bool):
+        return isinstance(new, bool)
+    if isinstance(current, (int, float)):
+        return isinstance(new, (int, float)) and not isinstance(new, bool) and math.isfinite(new) and abs(new) < 1e15
+    if isinstance(current, str):
+        return isinstance(new, str) and len(new) <= 1000
+    if isinstance(current, tuple):
+        return isinstance(new, (tuple, list)) and len(new) == len(current) and all(
+            acceptable(c, n) for c, n in zip(current, new, strict=True))
+    return False
+
+
+@cache
+def _plotly_js() -> str:
+    import plotly
+
+    return (Path(plotly.__file__).parent / "package_data" / "plotly.min.js").read_text(encoding="utf-8")
+
+
+@cache
+def _page_js() -> str:
+    script = (HERE / "page.js").read_text(encoding="utf-8")
+    style = (HERE / "page.css").read_text(encoding="utf-8")
+    return script.replace("__CSS__", json.dumps(style)).replace("__VIEWER__", json.dumps(sorted(VIEWER_NAMES)))

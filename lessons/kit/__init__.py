@@ -1,0 +1,1 @@
+"""The small vocabulary that lessons are written in: parameters, scene, figures, lesson."""
