@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from app.draw.space import Space, space_for
 from app.scenario import CameraPose
 from lessons.kit.scene import Camera, Orbit, Plane
 
@@ -33,6 +34,11 @@ class Pose:
         """Height of what is seen at the distance of `look_at`, in scene units."""
         return 2 * self.distance * math.tan(self.fov / 2)
 
+    def placed(self, space: Space) -> "Pose":
+        """The same pose in display units."""
+        position, look_at = space.display(self.position), space.display(self.look_at)
+        return Pose(tuple(position.tolist()), tuple(look_at.tolist()), self.up, self.fov)
+
     def wxyz(self) -> np.ndarray:
         """The orientation as a quaternion: looking along +z, down is +y (OpenCV)."""
         from core.rotation import rotation_vector_from_dcm
@@ -46,10 +52,10 @@ class Pose:
         return np.array([math.cos(angle / 2), *(math.sin(angle / 2) * axis)])
 
 
-def fit(camera: Camera, width: float, height: float, margin_scale: float = 1.0) -> Pose:
+def fit(camera: Camera, width: float, height: float, margin_scale: float = 1.0, keep_right: float = 0.0) -> Pose:
     """The pose that shows all of `camera` on a canvas of this size in pixels.
 
-    margin_scale: enlargement of the text round a plane view.
+    margin_scale: enlargement of the text round a plane view; keep_right: pixels left free at its right.
     """
     if isinstance(camera, Orbit):
         half = math.atan(math.tan(ORBIT_FOV / 2) * min(1.0, width / height))
@@ -61,6 +67,7 @@ def fit(camera: Camera, width: float, height: float, margin_scale: float = 1.0) 
         return Pose(position, camera.centre, (0.0, 0.0, 1.0), ORBIT_FOV)  # type: ignore[arg-type]
     small = margin_scale * min(1.0, width / 560, height / 560)
     left, right, top, bottom = (m * small if camera.axes else 8.0 for m in MARGINS)
+    right = max(right, keep_right)
     (x0, x1), (y0, y1) = camera.x, camera.y
     scale = max(min((width - left - right) / (x1 - x0), (height - top - bottom) / (y1 - y0)), 1e-12)
     x = (x0 + x1) / 2 - (left - right) / 2 / scale
@@ -81,7 +88,8 @@ class CameraController:
 
     def __init__(self, client: Any) -> None:
         self._client = client
-        self._sent: Pose | None = None
+        self._sent: Pose | None = None  # in display units
+        self._space = Space((0.0, 0.0, 0.0), 1.0)
         self._arrived = False  # a slow browser reports older poses for a while
 
     @property
@@ -96,13 +104,14 @@ class CameraController:
 
     def show(self, camera: Camera, chosen: CameraPose | None) -> None:
         """Move the client's camera there, unless it has been sent there before."""
-        pose = self.pose(camera, chosen)
+        self._space = space_for(camera)
+        pose = self.pose(camera, chosen).placed(self._space)
         if pose == self._sent:
             return
-        handle, distance = self._client.camera, pose.distance
-        handle.max_orbit_distance = 20 * distance
-        handle.min_orbit_distance = 1e-4 * distance
-        handle.near, handle.far = distance / 100, distance * 30
+        handle, distance = self._client.camera, fit(camera, *self.canvas).placed(self._space).distance
+        handle.max_orbit_distance = 7 * distance
+        handle.min_orbit_distance = 1e-3 * distance
+        handle.near, handle.far = distance / 1000, distance * 10
         handle.fov = pose.fov
         handle.up_direction = pose.up
         handle.position = pose.position
@@ -128,12 +137,12 @@ class CameraController:
             return None
         if np.abs(position - look_at).max() < 1e-9:
             return None
-        return CameraPose(tuple(position.tolist()), tuple(look_at.tolist()))
+        return CameraPose(*(tuple(self._space.scene(v).tolist()) for v in (position, look_at)))
 
     def stale(self, camera: Camera) -> bool:
         """Whether the fitted pose is not the one that was sent, because the canvas has changed."""
-        return self._sent is not None and fit(camera, *self.canvas) != self._sent
+        return self._sent is not None and fit(camera, *self.canvas).placed(self._space) != self._sent
 
     def accept(self, chosen: CameraPose, camera: Camera) -> None:
         """Remember that the client is at `chosen` already."""
-        self._sent, self._arrived = moved(camera, chosen), True
+        self._sent, self._arrived = moved(camera, chosen).placed(self._space), True

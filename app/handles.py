@@ -7,6 +7,7 @@ import numpy as np
 
 from app.controls import Change
 from app.draw.primitives import Style
+from app.draw.space import Space
 from core.types import Array
 from lessons.kit.params import Parameter, values
 
@@ -49,13 +50,15 @@ class Handles:
         self._parameters = {name: p for name, p in parameters.items() if p.kind == "point"}
         self._balls: dict[str, Any] = {}
         self._drawn: dict[str, tuple[Any, ...]] = {}
+        self._space = Space((0.0, 0.0, 0.0), 1.0)
 
-    def show(self, params: Any, style: Style) -> None:
+    def show(self, params: Any, style: Style, space: Space) -> None:
         """Put the balls where the parameters say."""
-        current = values(params)
+        current, self._space = values(params), space
         for name, parameter in self._parameters.items():
-            at = _in_space(current[name], style, parameter)
-            color, radius = style.theme.color(parameter.role), RADIUS * style.pixel * style.enlarge
+            x, y, z = space.display(_in_space(current[name], style))
+            at = (float(x), float(y), float(z))
+            color, radius = style.theme.color(parameter.role), RADIUS * style.pixel * space.scale
             if self._drawn.get(name) != (color, radius):
                 self._discard(name)
                 ball = self._client.scene.add_icosphere(f"/handle.{name}", radius, color, subdivisions=2,
@@ -83,11 +86,10 @@ class Handles:
         digits = _digits(parameter)
 
         async def dragged(event: Any) -> None:
-            origin = np.asarray(self._client.camera.position, dtype=np.float64)
-            start = np.asarray(ball.position, dtype=np.float64)
-            through = np.asarray(event.end_position, dtype=np.float64)
-            if through.shape != (3,) or not np.isfinite([origin, through]).all():
+            eye, through = (np.asarray(v, dtype=np.float64) for v in (self._client.camera.position, event.end_position))
+            if through.shape != (3,) or not np.isfinite([eye, through]).all():
                 return
+            origin, start, through = (self._space.scene(v) for v in (eye, ball.position, through))
             found = target(parameter.plane, start, origin, through)
             if found is None:
                 return
@@ -98,7 +100,7 @@ class Handles:
         ball.on_drag("left")(dragged)
 
 
-def _in_space(point: Any, style: Style, parameter: Parameter) -> tuple[float, float, float]:
+def _in_space(point: Any, style: Style) -> tuple[float, float, float]:
     x, y, *z = point
     # above the flat layers of a plane view
     return (x, y, z[0] if z else (40 * style.pixel if style.layered else 0.0))

@@ -1,6 +1,7 @@
 """The scene as a PNG: drawn again at the size asked for, with everything enlarged in proportion."""
 
 import io
+import logging
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,6 +11,7 @@ from PIL import Image, ImageDraw, ImageFont
 
 from app.camera import Pose, fit
 from app.draw.primitives import style_for
+from app.draw.space import space_for
 from app.theme import LIGHT
 from app.web import adapter
 from lessons.kit.scene import Camera
@@ -19,6 +21,8 @@ if TYPE_CHECKING:
 
 SIZES = {"1920 \u00d7 1080": (1920, 1080), "3840 \u00d7 2160": (3840, 2160)}
 MAX_SIDE = 8192
+SETTLE_SECONDS = 60.0
+log = logging.getLogger(__name__)
 
 
 def take(session: "Session", width: int, height: int, transparent: bool, with_legend: bool = True) -> bytes:
@@ -35,31 +39,44 @@ def take(session: "Session", width: int, height: int, transparent: bool, with_le
             raise RuntimeError("there is no picture yet")
         canvas = session.camera.canvas
         now = session.camera.pose(view.camera, shown.camera)
-        pose, enlarge = framed(view.camera, now, canvas, (width, height), shown.camera is not None)
+        legend = session.legend_of(view, shown, LIGHT) if with_legend else []
+        pose, enlarge = framed(view.camera, now, canvas, (width, height), shown.camera is not None, legend)
         client = session.client
         try:
             with client.atomic():
                 adapter.call_page(client, "setDark", False)
-                session.draw_scene(view, style_for(view.camera, LIGHT, enlarge), shown)
+                # viser's text grows with the height of the picture by itself, its lines and dots do not
+                grown = height / canvas[1]
+                style = style_for(view.camera, LIGHT, lines=enlarge, text=enlarge / grown, dots=grown)
+                session.draw_scene(view, style, shown)
             client.flush()
-            pixels = client.get_render(height, width, wxyz=pose.wxyz(), position=pose.position, fov=pose.fov,
+            if not adapter.wait_drawn(client, session.has_labels, SETTLE_SECONDS):
+                log.warning("the browser was still drawing; some labels may be missing")
+            placed = pose.placed(space_for(view.camera))
+            pixels = client.get_render(height, width, wxyz=placed.wxyz(), position=placed.position, fov=placed.fov,
                                        transport_format="png", timeout=120.0)
         finally:
             with client.atomic():
                 adapter.call_page(client, "setDark", shown.theme == "dark")
                 session.redraw_scene(view, shown)
             client.flush()
-    legend = session.legend_of(view, shown, LIGHT) if with_legend else []
     return compose(pixels, transparent, view.caption if with_legend else "", legend, enlarge)
 
 
-def framed(camera: Camera, now: Pose, canvas: tuple[int, int], size: tuple[int, int],
-           by_user: bool) -> tuple[Pose, float]:
-    """The pose for the picture, and how many of its pixels a pixel on the screen becomes."""
+def framed(camera: Camera, now: Pose, canvas: tuple[int, int], size: tuple[int, int], by_user: bool,
+           legend: list[tuple[str, str]]) -> tuple[Pose, float]:
+    """The pose for the picture, and how many of its pixels a pixel on the screen becomes.
+
+    The legend gets room at the right where that costs the scene little of its size.
+    """
     width, height = size
     pose, enlarge = now, height / canvas[1]
     for _ in range(1 if by_user else 3):
-        pose = now if by_user else fit(camera, width, height, enlarge)
+        if not by_user:
+            pose = fit(camera, width, height, enlarge)
+            beside = fit(camera, width, height, enlarge, legend_width(legend, enlarge))
+            if beside.visible_height < 1.2 * pose.visible_height:
+                pose = beside
         enlarge = (height / pose.visible_height) / (canvas[1] / now.visible_height)
         # text neither vanishes nor fills the picture, whatever the shape of the canvas
         enlarge = float(np.clip(enlarge, height / 1100, height / 560))
@@ -82,10 +99,15 @@ def compose(pixels: np.ndarray, transparent: bool, caption: str, legend: list[tu
     return out.getvalue()
 
 
+def legend_width(legend: list[tuple[str, str]], k: float) -> float:
+    """Pixels that the legend takes at the right of a picture."""
+    font = _font(round(13 * k))
+    return max((font.getlength(text) for _, text in legend), default=-54 * k) + 54 * k
+
+
 def _draw_legend(image: Image.Image, draw: ImageDraw.ImageDraw, legend: list[tuple[str, str]], k: float) -> None:
     font, row = _font(round(13 * k)), 20 * k
-    wide = max(draw.textlength(text, font=font) for _, text in legend) + 42 * k
-    x, y = image.width - wide - 12 * k, 12 * k
+    x, y = image.width - legend_width(legend, k), 12 * k
     for at, (color, text) in enumerate(legend):
         top = y + at * row
         draw.rounded_rectangle((x + 8 * k, top + 6 * k, x + 22 * k, top + 16 * k), 2 * k, fill=color)

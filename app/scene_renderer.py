@@ -34,6 +34,10 @@ class SceneRenderer:
         """Remove all nodes."""
         self.render(())
 
+    def shows(self, kind: str) -> bool:
+        """Whether a node of this kind is shown."""
+        return any(p.kind == kind for p, _ in self._nodes.values())
+
     @property
     def names(self) -> list[str]:
         return list(self._nodes)

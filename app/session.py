@@ -16,6 +16,7 @@ from app.camera import CameraController
 from app.controls import Controls
 from app.draw.lower import lower
 from app.draw.primitives import Style, style_for
+from app.draw.space import space_for
 from app.handles import Handles
 from app.page import Page
 from app.scenario import Scenario
@@ -142,7 +143,7 @@ class Session:
 
     def _open(self) -> None:
         """First work for a new browser: read its address, build the page, show what it asks for."""
-        query = adapter.read_query(self.client)
+        query = adapter.ask_page(self.client, "window.paikka.search", 10.0)
         wanted, problems = scenarios.from_query(query, self._registry, self.scenario.lesson)
         with self._lock:
             self.scenario = wanted
@@ -186,9 +187,10 @@ class Session:
 
     def draw_scene(self, view: View, style: Style, scenario: Scenario) -> None:
         """The 3-D part alone: also drawn enlarged for a saved picture."""
-        self._scene.render(lower(view, style))
+        space = space_for(view.camera)
+        self._scene.render(space.place(lower(view, style)))
         if self._handles is not None:
-            self._handles.show(scenario.params, style)
+            self._handles.show(scenario.params, style, space)
 
     def redraw_scene(self, view: View, scenario: Scenario) -> None:
         """The 3-D part as the client's own screen wants it."""
@@ -211,6 +213,11 @@ class Session:
             return
         self.client.send_file_download(f"{self.scenario.lesson}.png", png, save_immediately=True)
         self.client.flush()
+
+    @property
+    def has_labels(self) -> bool:
+        """Whether there is text in the scene."""
+        return self._scene.shows("label")
 
     @property
     def node_names(self) -> list[str]:

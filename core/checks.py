@@ -36,16 +36,16 @@ def covariance(name: str, value: object, n: int | None = None) -> Array:
     P = finite(name, value, n, n)
     if P.shape[-1] != P.shape[-2]:
         raise ValueError(f"{name}: expected a square matrix, got shape {P.shape}")
-    asymmetry = np.abs(P - P.mT)
-    scale = np.abs(P).max(initial=0.0)
-    if asymmetry.max(initial=0.0) > 1e-8 * scale:
+    scale = np.abs(P).max(axis=(-2, -1), initial=0.0)
+    asymmetry = np.abs(P - P.mT).max(axis=(-2, -1), initial=0.0)
+    if (asymmetry > 1e-8 * scale).any():
         raise ValueError(f"{name}: expected a symmetric matrix, got an asymmetry of {asymmetry.max():.3g}")
     try:
         np.linalg.cholesky(P)
     except np.linalg.LinAlgError:
-        smallest = np.linalg.eigvalsh(P).min()
-        if smallest < -1e-8 * scale:
+        smallest = np.linalg.eigvalsh(P).min(axis=-1)
+        if (smallest < -1e-8 * scale).any():
             raise ValueError(
-                f"{name}: expected a positive semidefinite matrix, got the eigenvalue {smallest:.3g}"
+                f"{name}: expected a positive semidefinite matrix, got the eigenvalue {smallest.min():.3g}"
             ) from None
     return P

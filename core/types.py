@@ -1,11 +1,10 @@
 """Records and protocols that every module of `core` shares."""
 
-from typing import NamedTuple, Protocol
+from typing import NamedTuple, Protocol, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+Array: TypeAlias = np.ndarray[tuple[int, ...], np.dtype[np.float64]]  # numpy.typing would cost every import 14 ms
 
 
 class Gaussian(NamedTuple):

@@ -1,7 +1,7 @@
 """The kinds of node that the renderer knows, and the style that items are drawn in."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, Literal
 
 import numpy as np
@@ -27,29 +27,34 @@ class Primitive:
 
 @dataclass(frozen=True, slots=True)
 class Style:
-    """How items are drawn: colours, the length of a pixel in scene units, enlargement for a saved picture."""
+    """How items are drawn: colours, the length of a pixel in scene units, enlargement for a saved picture.
+
+    lines, text and dots: factors for a saved picture on what viser does not enlarge by itself.
+    """
 
     theme: Theme
     pixel: float
-    enlarge: float = 1.0
+    lines: float = 1.0
+    text: float = 1.0
+    dots: float = 1.0
     layered: bool = False
-    hidden: frozenset[str] = field(default_factory=frozenset)
 
 
-def style_for(camera: Camera, theme: Theme, enlarge: float = 1.0) -> Style:
+def style_for(camera: Camera, theme: Theme, lines: float = 1.0, text: float = 1.0,
+              dots: float = 1.0) -> Style:
     """The style of a view: a pixel is 1/900 of the height that the camera must show."""
     if isinstance(camera, Plane):
         height = max(camera.y[1] - camera.y[0], (camera.x[1] - camera.x[0]) / 1.4)
     else:
         height = 2.2 * camera.radius
-    return Style(theme, height / PICTURE_HEIGHT, enlarge, isinstance(camera, Plane))
+    return Style(theme, height / PICTURE_HEIGHT, lines, text, dots, isinstance(camera, Plane))
 
 
 def lines(name: str, pairs: Array, color: Rgb, width: float, style: Style) -> Primitive:
     """Segments (n, 2, 3) with a width in screen pixels."""
     return Primitive(name, "lines", {
-        "points": np.asarray(pairs, np.float32), "colors": np.array(color, np.uint8),
-        "thickness": width * style.enlarge, "thickness_units": "screen",
+        "points": np.asarray(pairs, np.float64), "colors": np.array(color, np.uint8),
+        "thickness": width * style.lines, "thickness_units": "screen",
     })
 
 
@@ -57,8 +62,8 @@ def points(name: str, positions: Array, color: Rgb | Array, size: float, style: 
            shape: str = "circle") -> Primitive:
     """Dots (n, 3); size is their diameter in pixels of the standard picture."""
     return Primitive(name, "points", {
-        "points": np.asarray(positions, np.float32), "colors": np.asarray(color, np.uint8),
-        "point_size": size * style.pixel, "point_shape": shape, "precision": "float32", "point_shading": "flat",
+        "points": np.asarray(positions, np.float64), "colors": np.asarray(color, np.uint8),
+        "point_size": size * style.pixel * style.dots, "point_shape": shape, "precision": "float32", "point_shading": "flat",
     })
 
 
@@ -67,7 +72,7 @@ def arrows(name: str, pairs: Array, colors: Rgb | Array, width: float, style: St
 
     viser takes the colours of arrows as linear light, those of everything else as sRGB.
     """
-    pairs = np.asarray(pairs, np.float32)
+    pairs = np.asarray(pairs, np.float64)
     radius = 0.5 * width * style.pixel
     lengths = np.sqrt(((pairs[:, 1] - pairs[:, 0]) ** 2).sum(axis=-1))
     head = min(7.0 * radius, 0.5 * float(lengths.max(initial=0.0)))
@@ -85,7 +90,7 @@ def mesh(name: str, vertices: Array, faces: Array, color: Rgb, opacity: float | 
          flat: bool = True) -> Primitive:
     """A triangle mesh seen from both sides; opacity None is opaque."""
     return Primitive(name, "mesh", {
-        "vertices": np.asarray(vertices, np.float32), "faces": np.asarray(faces, np.uint32), "color": color,
+        "vertices": np.asarray(vertices, np.float64), "faces": np.asarray(faces, np.uint32), "color": color,
         "opacity": opacity, "flat_shading": flat, "side": "double", "cast_shadow": False, "receive_shadow": False,
     })
 
@@ -99,7 +104,7 @@ def label(name: str, text: str, position: Sequence[float], style: Style, size: f
     """Text of constant size on the screen."""
     x, y, z = (float(v) for v in position)
     return Primitive(name, "label", {
-        "text": text, "font_size_mode": "screen", "font_screen_scale": size * style.enlarge, "depth_test": False,
+        "text": text, "font_size_mode": "screen", "font_screen_scale": size * style.text, "depth_test": False,
         "anchor": ANCHORS[anchor],
     }, (x, y, z))
 

@@ -10,12 +10,14 @@ import json
 import logging
 import math
 import secrets
+import time
 from collections.abc import Callable, Iterator
 from functools import cache, partial
 from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
+import rich
 import viser
 import viser._messages as messages
 import websockets.asyncio.server
@@ -42,6 +44,8 @@ def start_server(host: str, port: int, hosts: frozenset[str] = LOOPBACK) -> vise
 
     port 0 takes any free one.  The share, form and upload messages have no handlers.
     """
+    rich.reconfigure(quiet=True)  # viser announces itself with it; the command line says what users need
+    logging.getLogger("websockets").setLevel(logging.CRITICAL)  # a browser's spare connections are no errors
     with _guarded_serve(hosts):
         server = viser.ViserServer(host=host, port=port, label="Paikka", verbose=False)
     _forget(server._websock_server)
@@ -72,17 +76,34 @@ def call_page(client: viser.ClientHandle, function: str, *arguments: object) -> 
     run_script(client, f"window.paikka.{function}({', '.join(json.dumps(a) for a in arguments)})")
 
 
-def read_query(client: viser.ClientHandle, timeout: float = 5.0) -> str:
-    """The page's query string as it was when the page opened; empty when the browser does not tell."""
+def ask_page(client: viser.ClientHandle, expression: str, timeout: float = 5.0) -> str:
+    """The value of a JavaScript expression in the page, as text; empty when the browser does not tell in time.
+
+    Blocks: never call it on the event loop.
+    """
     key = f"paikka-{secrets.token_hex(8)}"
-    run_script(client, f"localStorage.setItem({json.dumps('viser-user:' + key)}, window.paikka.search)")
+    run_script(client, f"localStorage.setItem({json.dumps('viser-user:' + key)}, {expression})")
     try:
         return client.local_storage.get_item(key, timeout=timeout) or ""
     except (RuntimeError, TimeoutError) as error:
-        log.warning("could not read the page's address: %s", error)
+        log.warning("the page did not answer: %s", error)
         return ""
     finally:
         client.local_storage.remove_item(key)
+
+
+def wait_drawn(client: viser.ClientHandle, with_text: bool, timeout: float) -> bool:
+    """True when the browser has drawn all that was sent; the glyphs of labels (with_text) take it several frames.
+
+    Blocks: never call it on the event loop.
+    """
+    deadline = time.monotonic() + timeout
+    call_page(client, "mark")
+    while time.monotonic() < deadline:
+        if ask_page(client, f"String(window.paikka.settled({json.dumps(with_text)}))", timeout) == "true":
+            return True
+        time.sleep(0.1)
+    return False
 
 
 def widget_id(handle: Any) -> str:

@@ -15,6 +15,21 @@
   const kinds = new WeakMap(); // program -> "text", "box" or "other"
   const inked = new WeakSet();
   let running = null;
+  // Glyphs are rasterised a few per frame: all are there when frames come without another upload of the atlas.
+  const drawn = { at: performance.now(), upload: performance.now(), frames: 0 };
+  for (const name of ["texImage2D", "texSubImage2D"]) {
+    const inner = gl2[name];
+    gl2[name] = function (...rest) {
+      if (!rest.includes(this.FLOAT)) Object.assign(drawn, { upload: performance.now(), frames: 0 });
+      return inner.apply(this, rest);
+    };
+  }
+  const { clear } = gl2;
+  gl2.clear = function (mask) {
+    drawn.at = performance.now();
+    drawn.frames += 1;
+    return clear.call(this, mask);
+  };
   gl2.shaderSource = function (shader, source) {
     if (source.includes(blackText)) {
       source = source.replace(blackText, grayText).replace("void main()", "uniform float pkInk;\nvoid main()");
@@ -61,7 +76,9 @@
   addEventListener("resize", place);
 
   // viser's inputs carry no accessible name; take it from the row's label.
+  let hidden = []; // ids of sliders whose number field shows an exponent
   const nameInputs = () => {
+    for (const id of hidden) document.getElementById(id)?.classList.add("pk-log");
     for (const label of document.querySelectorAll("label[for]")) {
       const row = label.parentElement && label.closest("div")?.parentElement;
       if (!row) continue;
@@ -79,6 +96,13 @@
   window.paikka = {
     labels,
     search: location.search,
+    // Whether what was sent before mark() is drawn; withText: labels included.
+    mark: () => Object.assign(drawn, { upload: performance.now(), frames: 0 }),
+    settled(withText) {
+      const now = performance.now();
+      if (withText && labels.patched === 0) return false;
+      return now - Math.max(drawn.at, drawn.upload) > 1500 || (drawn.frames >= 8 && now - drawn.upload > 500);
+    },
     setQuery(query) {
       const kept = new URLSearchParams(location.search);
       const viewer = __VIEWER__.filter((n) => kept.has(n)).map((n) => `${n}=${encodeURIComponent(kept.get(n))}`);
@@ -104,7 +128,8 @@
       place();
     },
     hideNumber(ids) {
-      for (const id of ids) document.getElementById(id)?.classList.add("pk-log");
+      hidden = ids;
+      nameInputs();
     },
     setTitle(title) { document.title = title; },
   };

@@ -1,0 +1,1 @@
+"""Pictures, figures and data without anyone at a browser."""

@@ -1,0 +1,109 @@
+"""Weighing a cloud block by block: w ~ exp(log w), its sum, its effective size and its moments, without underflow."""
+
+from functools import lru_cache
+from typing import NamedTuple
+
+import numpy as np
+
+from core.types import Array
+
+
+class AllWeightsZero(ValueError):
+    """sum w = 0: no particle can explain the measurement."""
+
+
+class Piece(NamedTuple):
+    """Sums over one block, relative to its largest weight exp(peak) and to the particle c that has it.
+
+    total = sum w, squares = sum w^2, first = sum w (x - c), second = sum w (x - c)(x - c)',  w = exp(log w - peak).
+    """
+
+    peak: float
+    total: float
+    squares: float
+    c: Array
+    first: Array
+    second: Array
+
+
+class Summary(NamedTuple):
+    """log_sum = log sum exp(log w), n_eff = 1 / sum w^2, mean, cov of the normalised weights; scales of the blocks."""
+
+    log_sum: float
+    n_eff: float
+    mean: Array
+    cov: Array
+    scales: Array
+
+
+@lru_cache(maxsize=16)
+def equal_weights(N: int) -> tuple[Array, Array]:
+    """w = 1/N and log w, each one number seen N times (read-only, no memory)."""
+    return np.broadcast_to(1.0 / N, N), np.broadcast_to(-np.log(N), N)
+
+
+def log_weights(w: Array) -> tuple[Array | float, float]:
+    """log w (B,), or one number if all are equal; and sum w.
+
+    ValueError for a weight that is negative, infinite or NaN.
+    """
+    low, high = float(w.min()), float(w.max())
+    if not 0.0 <= low <= high < np.inf:
+        raise ValueError(f"weights: expected finite numbers >= 0, got numbers from {low} to {high}")
+    with np.errstate(divide="ignore"):
+        return (np.log(low) if low == high else np.log(w)), float(w.sum())
+
+
+def weigh(log_factor: Array, before: Array | float, x: Array, w: Array) -> Piece:
+    """log w = log_factor + before, and the sums of a block.
+
+    log_factor (B,) may hold -inf; before (B,), or one number for all; x (B, n); fills w (B,) with exp(log w - peak).
+    ValueError for NaN or +inf in log w, or NaN or infinity in x.
+    """
+    n = x.shape[-1]
+    one = np.ndim(before) == 0                            # then the shift cancels and only moves the peak
+    log_w = log_factor if one else log_factor + before
+    best = int(log_w.argmax())                            # argmax stops at a NaN
+    peak = float(log_w[best])
+    if peak == -np.inf:
+        w.fill(0.0)
+        return Piece(peak, 0.0, 0.0, np.zeros(n), np.zeros(n), np.zeros((n, n)))
+    if not np.isfinite(peak):
+        raise ValueError(f"log weight of a particle: expected a number or -inf, got {peak} at x = {x[best]}")
+    np.subtract(log_w, peak, out=w)
+    np.exp(w, out=w)
+    c = x[best].copy()                                    # near the mean of the weighted cloud, so little cancels
+    d, e = x.T - c[:, None], np.empty(len(x))
+    first, second = np.empty(n), np.empty((n, n))
+    for k in range(n):
+        np.multiply(d[k], w, out=e)
+        first[k] = e.sum()
+        second[k, :k + 1] = second[:k + 1, k] = np.einsum("b,jb->j", e, d[:k + 1])     # not BLAS: it has own threads
+    if not np.isfinite(second).all():
+        raise ValueError("particles: expected finite states, got NaN or infinity after the motion model")
+    squares = float(np.einsum("b,b", w, w))
+    return Piece(peak + float(before) if one else peak, float(w.sum()), squares, c, first, second)
+
+
+def combine(pieces: list[Piece]) -> Summary:
+    """Sums over all blocks: mean = sum w x / sum w, cov = sum w (x - mean)(x - mean)' / sum w.
+
+    AllWeightsZero if every weight is zero.  MAT Algorithm 5, step 4.
+    """
+    peak, total, squares, c, first, second = (np.array(column) for column in zip(*pieces, strict=True))
+    top = peak.max()
+    if top == -np.inf:
+        raise AllWeightsZero(
+            "every particle has weight zero: the measurement is impossible for all of them; use more particles, a "
+            "wider proposal, or a measurement noise with tails"
+        )
+    scale = np.exp(peak - top)
+    S = scale @ total
+    share = scale / S
+    mean = share @ (total[:, None] * c + first)
+    delta = c - mean                                      # x - mean = (x - c) + delta
+    cross = first[:, :, None] * delta[:, None, :]
+    parts = second + cross + cross.mT + total[:, None, None] * delta[:, :, None] * delta[:, None, :]
+    cov = np.einsum("k,kij->ij", share, parts)
+    n_eff = 1.0 / (np.square(share) @ squares)
+    return Summary(float(top + np.log(S)), float(n_eff), mean, 0.5 * (cov + cov.T), share)
