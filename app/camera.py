@@ -1,6 +1,7 @@
 """Where the camera must stand so that a lesson fills the canvas, and whether the user has moved it."""
 
 import math
+import threading
 from dataclasses import dataclass
 from typing import Any
 
@@ -13,7 +14,11 @@ from lessons.kit.scene import Camera, Orbit, Plane
 PLANE_FOV = math.radians(5.0)  # nearly parallel: a plane looks like a plot on paper
 ORBIT_FOV = math.radians(32.0)
 # Pixels kept free at left, right, top and bottom of a plane view, for the numbers on its axes and the caption.
-MARGINS = (74.0, 26.0, 66.0, 64.0)
+MARGINS = (84.0, 28.0, 88.0, 66.0)
+BARE_MARGINS = (8.0, 8.0, 62.0, 8.0)
+LEGEND_ROW, LEGEND_FRAME = 20.3, 26.0  # pixels of the legend in the page
+NARROW = 480  # below this width the legend lies at the top
+MAY_SHRINK = 1.3  # how much smaller a scene may get for the sake of a legend
 
 
 @dataclass(frozen=True, slots=True)
@@ -52,10 +57,22 @@ class Pose:
         return np.array([math.cos(angle / 2), *(math.sin(angle / 2) * axis)])
 
 
-def fit(camera: Camera, width: float, height: float, margin_scale: float = 1.0, keep_right: float = 0.0) -> Pose:
+@dataclass(frozen=True, slots=True)
+class Room:
+    """Pixels of the canvas that other things want at its right or below: they get them if the scene stays large.
+
+    text: enlargement of the text round a plane view.
+    """
+
+    right: float = 0.0
+    below: float = 0.0
+    text: float = 1.0
+
+
+def fit(camera: Camera, width: float, height: float, room: Room = Room()) -> Pose:  # noqa: B008
     """The pose that shows all of `camera` on a canvas of this size in pixels.
 
-    margin_scale: enlargement of the text round a plane view; keep_right: pixels left free at its right.
+    A plane view stands at the top of the canvas, so that what is left over is below it.
     """
     if isinstance(camera, Orbit):
         half = math.atan(math.tan(ORBIT_FOV / 2) * min(1.0, width / height))
@@ -65,14 +82,22 @@ def fit(camera: Camera, width: float, height: float, margin_scale: float = 1.0, 
                      math.sin(elevation))
         position = tuple(c + distance * d for c, d in zip(camera.centre, direction, strict=True))
         return Pose(position, camera.centre, (0.0, 0.0, 1.0), ORBIT_FOV)  # type: ignore[arg-type]
-    small = margin_scale * min(1.0, width / 560, height / 560)
-    left, right, top, bottom = (m * small if camera.axes else 8.0 for m in MARGINS)
-    right = max(right, keep_right)
+    small = room.text * min(1.0, width / room.text / 560, height / room.text / 560)
+    left, right, top, bottom = (m * small for m in (MARGINS if camera.axes else BARE_MARGINS))
     (x0, x1), (y0, y1) = camera.x, camera.y
-    scale = max(min((width - left - right) / (x1 - x0), (height - top - bottom) / (y1 - y0)), 1e-12)
-    x = (x0 + x1) / 2 - (left - right) / 2 / scale
-    y = (y0 + y1) / 2 - (bottom - top) / 2 / scale
-    distance = height / scale / 2 / math.tan(PLANE_FOV / 2)
+
+    def scale(free_right: float, free_below: float) -> float:
+        return max(min((width - left - free_right) / (x1 - x0), (height - top - free_below) / (y1 - y0)), 1e-12)
+
+    best = scale(right, bottom)
+    if scale(max(right, room.right), bottom) > best / MAY_SHRINK:
+        right = max(right, room.right)
+    if scale(right, bottom + room.below) > best / MAY_SHRINK:
+        bottom += room.below
+    final = scale(right, bottom)
+    x = (x0 + x1) / 2 - (left - right) / 2 / final
+    y = y1 - (height / 2 - top) / final
+    distance = height / final / 2 / math.tan(PLANE_FOV / 2)
     return Pose((x, y, distance), (x, y, 0.0), (0.0, 1.0, 0.0), PLANE_FOV)
 
 
@@ -90,7 +115,10 @@ class CameraController:
         self._client = client
         self._sent: Pose | None = None  # in display units
         self._space = Space((0.0, 0.0, 0.0), 1.0)
+        self._room = Room()
         self._arrived = False  # a slow browser reports older poses for a while
+        self._reported: tuple[np.ndarray, np.ndarray] | None = None
+        self._lock = threading.Lock()
 
     @property
     def canvas(self) -> tuple[int, int]:
@@ -100,48 +128,63 @@ class CameraController:
 
     def pose(self, camera: Camera, chosen: CameraPose | None) -> Pose:
         """Where the camera should be now."""
-        return fit(camera, *self.canvas) if chosen is None else moved(camera, chosen)
+        return self._fitted(camera) if chosen is None else moved(camera, chosen)
 
-    def show(self, camera: Camera, chosen: CameraPose | None) -> None:
+    def show(self, camera: Camera, chosen: CameraPose | None, legend_rows: int = 0) -> None:
         """Move the client's camera there, unless it has been sent there before."""
-        self._space = space_for(camera)
-        pose = self.pose(camera, chosen).placed(self._space)
-        if pose == self._sent:
-            return
-        handle, distance = self._client.camera, fit(camera, *self.canvas).placed(self._space).distance
-        handle.max_orbit_distance = 7 * distance
-        handle.min_orbit_distance = 1e-3 * distance
-        handle.near, handle.far = distance / 1000, distance * 10
-        handle.fov = pose.fov
-        handle.up_direction = pose.up
-        handle.position = pose.position
-        handle.look_at = pose.look_at
-        self._sent, self._arrived = pose, False
+        with self._lock:
+            self._room = Room(below=LEGEND_ROW * legend_rows + LEGEND_FRAME if legend_rows else 0.0)
+            self._space = space_for(camera)
+            pose = self.pose(camera, chosen).placed(self._space)
+            if pose == self._sent:
+                return
+            handle, distance = self._client.camera, self._fitted(camera).placed(self._space).distance
+            handle.max_orbit_distance = 7 * distance
+            handle.min_orbit_distance = 1e-3 * distance
+            handle.near, handle.far = distance / 1000, distance * 10
+            handle.fov = pose.fov
+            handle.up_direction = pose.up
+            handle.position = pose.position
+            handle.look_at = pose.look_at
+            self._sent, self._arrived = pose, False
+
+    def report(self) -> None:
+        """A message of the client has just set `client.camera`: note it, unless it makes no sense."""
+        with self._lock:
+            camera = self._client.camera
+            try:
+                position, look_at = (np.array(v, dtype=np.float64) for v in (camera.position, camera.look_at))
+            except (TypeError, ValueError):
+                return
+            if position.shape != (3,) or look_at.shape != (3,) or not np.isfinite([position, look_at]).all():
+                return
+            self._reported = position, look_at
+            self._arrived = self._arrived or self._at_sent()
 
     def user_pose(self) -> CameraPose | None:
-        """The client's pose if the user has moved the camera away from where we put it."""
-        if self._sent is None:
-            return None
-        camera = self._client.camera
-        try:
-            position, look_at = (np.asarray(v, dtype=np.float64) for v in (camera.position, camera.look_at))
-        except (TypeError, ValueError):
-            return None
-        if position.shape != (3,) or look_at.shape != (3,) or not np.isfinite([position, look_at]).all():
-            return None
+        """The pose that the client last reported, if the user has moved the camera away from where we put it."""
+        with self._lock:
+            if self._reported is None or not self._arrived or self._at_sent():
+                return None
+            position, look_at = self._reported
+            if np.abs(position - look_at).max() < 1e-9:
+                return None
+            return CameraPose(*(tuple(self._space.scene(v).tolist()) for v in (position, look_at)))
+
+    def _at_sent(self) -> bool:
+        if self._reported is None or self._sent is None:
+            return False
         slack = 2e-3 * self._sent.distance
-        if np.abs(position - self._sent.position).max() < slack and np.abs(look_at - self._sent.look_at).max() < slack:
-            self._arrived = True
-            return None
-        if not self._arrived:
-            return None
-        if np.abs(position - look_at).max() < 1e-9:
-            return None
-        return CameraPose(*(tuple(self._space.scene(v).tolist()) for v in (position, look_at)))
+        return all(np.abs(v - w).max() < slack
+                   for v, w in zip(self._reported, (self._sent.position, self._sent.look_at), strict=True))
+
+    def _fitted(self, camera: Camera) -> Pose:
+        width, height = self.canvas
+        return fit(camera, width, height, self._room if width > NARROW else Room())
 
     def stale(self, camera: Camera) -> bool:
         """Whether the fitted pose is not the one that was sent, because the canvas has changed."""
-        return self._sent is not None and fit(camera, *self.canvas).placed(self._space) != self._sent
+        return self._sent is not None and self._fitted(camera).placed(self._space) != self._sent
 
     def accept(self, chosen: CameraPose, camera: Camera) -> None:
         """Remember that the client is at `chosen` already."""

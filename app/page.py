@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 log = logging.getLogger(__name__)
 
 LEFT_WIDTH, RIGHT_WIDTH = 400, 330
-BRAND = (0, 84, 166)
+BRAND = {False: (0, 84, 166), True: (82, 152, 255)}
 KEYS = (
     ("PageDown, N", "one step forwards"), ("PageUp, B", "one step backwards"),
     ("Shift+N, Shift+B", "one stage forwards, backwards"), ("P", "play, pause"), ("R", "reset the lesson"),
@@ -173,7 +173,7 @@ class Page:
         if dark == self._dark:
             return
         first, self._dark = self._dark is None, dark
-        self._gui.configure_theme(dark_mode=dark, show_logo=False, show_share_button=False, brand_color=BRAND)
+        self._gui.configure_theme(dark_mode=dark, show_logo=False, show_share_button=False, brand_color=BRAND[dark])
         adapter.call_page(self._client, "setDark", dark)
         if not first:
             self._dark_box.value = dark
@@ -213,7 +213,8 @@ class Page:
 
     def show_view(self, view: View, words: Words, legend: list[tuple[str, str]]) -> None:
         """The numbers and what lies over the scene."""
-        self._readouts.content = f'<div class="pk">{readouts_html(tuple(view.readouts), words)}</div>'
+        self._readouts.content = (f'<div class="pk">{readouts_html(tuple(view.readouts), words)}'
+                                  f"{legend_html(legend)}</div>")
         self._equations.content = equations_html(tuple(view.equations), words)
         self._status.visible = False
         self.show_progress(None)
@@ -245,6 +246,12 @@ def lesson_html(entry: Entry, words: Words) -> str:
         rows = "".join(f"<li><b>{html.escape(name)}</b>: {to_html(text)[3:-5]}</li>" for name, text in notes)
         parts.append(f"<h1>Presets</h1><ul>{rows}</ul>")
     return f'<div class="pk">{"".join(parts)}</div>'
+
+
+def legend_html(legend: list[tuple[str, str]]) -> str:
+    """The legend for windows that are too narrow to have it over the scene."""
+    rows = "".join(f'<div><i style="background:{color}"></i>{html.escape(text)}</div>' for color, text in legend)
+    return f'<div class="pk-narrow-legend">{rows}</div>'
 
 
 def error_html(lesson: str, message: str) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from app.camera import Pose, fit
+from app.camera import Pose, Room, fit
 from app.draw.primitives import style_for
 from app.draw.space import space_for
 from app.theme import LIGHT
@@ -73,10 +73,7 @@ def framed(camera: Camera, now: Pose, canvas: tuple[int, int], size: tuple[int, 
     pose, enlarge = now, height / canvas[1]
     for _ in range(1 if by_user else 3):
         if not by_user:
-            pose = fit(camera, width, height, enlarge)
-            beside = fit(camera, width, height, enlarge, legend_width(legend, enlarge))
-            if beside.visible_height < 1.2 * pose.visible_height:
-                pose = beside
+            pose = fit(camera, width, height, Room(right=legend_width(legend, enlarge), text=enlarge))
         enlarge = (height / pose.visible_height) / (canvas[1] / now.visible_height)
         # text neither vanishes nor fills the picture, whatever the shape of the canvas
         enlarge = float(np.clip(enlarge, height / 1100, height / 560))

@@ -179,11 +179,12 @@ class Session:
         if page is None:
             return
         page.set_theme(scenario.theme == "dark")
-        self.camera.show(view.camera, scenario.camera)
         style = style_for(view.camera, theme)
+        entries = legend(view, words, style)
+        self.camera.show(view.camera, scenario.camera, len(words.legend))
         self.draw_scene(view, style, scenario)
         page.figures.render(view.figures, words, theme)
-        page.show_view(view, words, legend(view, words, style))
+        page.show_view(view, words, entries)
 
     def draw_scene(self, view: View, style: Style, scenario: Scenario) -> None:
         """The 3-D part alone: also drawn enlarged for a saved picture."""
@@ -275,7 +276,7 @@ class Session:
 
     async def _camera_moved(self, _: Any) -> None:
         """Wait until the camera rests: then it is part of the scenario, or the picture is fitted to the new canvas."""
-        self.camera.user_pose()
+        self.camera.report()
         loop = asyncio.get_running_loop()
         if self._settling is not None:
             self._settling.cancel()

@@ -33,6 +33,7 @@ class Transport:
         self._speed = gui.add_dropdown("Speed", tuple(SPEEDS), initial_value="5 steps/s")
         self._scrubber: Any = None
         self._stages: Any = None
+        self._stage_names: list[str] = []
 
     @property
     def playing(self) -> bool:
@@ -56,6 +57,7 @@ class Transport:
         if len(timeline.stages) > 1:
             names = [words.label("stages", stage) for stage in timeline.stages]
             self._stages = self._gui.add_button_group("Stage", tuple(names))
+            self._stage_names = names
 
             async def chosen(event: Any) -> None:
                 if event.client is not None and self._stages.value in names:
@@ -69,6 +71,8 @@ class Transport:
         if self._scrubber is not None:
             self._scrubber.value = self._step
             self._scrubber.label = self._label()
+        if self._stages is not None:
+            self._stages.label = f"Stage: {self._stage_names[self._stage]}"
 
     def step(self, by: int) -> None:
         """`by` steps on, at the same kind of moment: all stages done."""

@@ -1,5 +1,7 @@
 """Weighing a cloud block by block: w ~ exp(log w), its sum, its effective size and its moments, without underflow."""
 
+import math
+from collections.abc import Sequence
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -33,7 +35,7 @@ class Summary(NamedTuple):
     n_eff: float
     mean: Array
     cov: Array
-    scales: Array
+    scales: list[float]
 
 
 @lru_cache(maxsize=16)
@@ -51,7 +53,7 @@ def log_weights(w: Array) -> tuple[Array | float, float]:
     if not 0.0 <= low <= high < np.inf:
         raise ValueError(f"weights: expected finite numbers >= 0, got numbers from {low} to {high}")
     with np.errstate(divide="ignore"):
-        return (np.log(low) if low == high else np.log(w)), float(w.sum())
+        return (np.log(low), low * len(w)) if low == high else (np.log(w), float(w.sum()))
 
 
 def weigh(log_factor: Array, before: Array | float, x: Array, w: Array) -> Piece:
@@ -78,32 +80,39 @@ def weigh(log_factor: Array, before: Array | float, x: Array, w: Array) -> Piece
     for k in range(n):
         np.multiply(d[k], w, out=e)
         first[k] = e.sum()
-        second[k, :k + 1] = second[:k + 1, k] = np.einsum("b,jb->j", e, d[:k + 1])     # not BLAS: it has own threads
+        second[k, :k + 1] = second[:k + 1, k] = _inner(e, d[:k + 1])
     if not np.isfinite(second).all():
         raise ValueError("particles: expected finite states, got NaN or infinity after the motion model")
-    squares = float(np.einsum("b,b", w, w))
+    squares = float(_inner(w, w[None])[0])
     return Piece(peak + float(before) if one else peak, float(w.sum()), squares, c, first, second)
 
 
-def combine(pieces: list[Piece]) -> Summary:
+def combine(pieces: Sequence[Piece]) -> Summary:
     """Sums over all blocks: mean = sum w x / sum w, cov = sum w (x - mean)(x - mean)' / sum w.
 
     AllWeightsZero if every weight is zero.  MAT Algorithm 5, step 4.
     """
-    peak, total, squares, c, first, second = (np.array(column) for column in zip(*pieces, strict=True))
-    top = peak.max()
+    top = max(p.peak for p in pieces)
     if top == -np.inf:
         raise AllWeightsZero(
             "every particle has weight zero: the measurement is impossible for all of them; use more particles, a "
             "wider proposal, or a measurement noise with tails"
         )
-    scale = np.exp(peak - top)
-    S = scale @ total
-    share = scale / S
-    mean = share @ (total[:, None] * c + first)
-    delta = c - mean                                      # x - mean = (x - c) + delta
-    cross = first[:, :, None] * delta[:, None, :]
-    parts = second + cross + cross.mT + total[:, None, None] * delta[:, :, None] * delta[:, None, :]
-    cov = np.einsum("k,kij->ij", share, parts)
-    n_eff = 1.0 / (np.square(share) @ squares)
-    return Summary(float(top + np.log(S)), float(n_eff), mean, 0.5 * (cov + cov.T), share)
+    scales = [math.exp(p.peak - top) for p in pieces]
+    S = math.fsum(s * p.total for s, p in zip(scales, pieces, strict=True))
+    shares = [s / S for s in scales]
+    mean = sum(s * (p.total * p.c + p.first) for s, p in zip(shares, pieces, strict=True))
+    cov = np.zeros((len(mean), len(mean)))
+    for s, p in zip(shares, pieces, strict=True):
+        delta = p.c - mean                                # x - mean = (x - c) + delta
+        cross = (p.first + 0.5 * p.total * delta)[:, None] * delta
+        cov += s * (p.second + cross + cross.T)
+    n_eff = 1.0 / math.fsum(s * s * p.squares for s, p in zip(shares, pieces, strict=True))
+    return Summary(top + math.log(S), n_eff, mean, cov, shares)
+
+
+def _inner(a: Array, B: Array) -> Array:
+    """sum_b a_b B_jb: a (B,), B (j, B)."""
+    if len(a) <= 10_000:
+        return np.vecdot(a, B)
+    return np.einsum("b,jb->j", a, B)                     # for long vectors BLAS would start threads of its own

@@ -10,12 +10,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from core.checks import finite
-from core.dop import position_covariance
-from core.linalg import cholesky_positive, solve_vectors
-from core.orthogonal import back_substitute, factorise, inverse_gram
+from core.gauss_newton_steps import iterate, whiten
+from core.linalg import cholesky_positive
+from core.orthogonal import factorise, inverse_gram
 from core.types import Array, Sensor
-
-_LIMIT = 1e100                                            # an iterate beyond this has diverged
 
 
 class Solution(NamedTuple):
@@ -23,8 +21,9 @@ class Solution(NamedTuple):
 
     x (n,), the last iterate.  iterates (k + 1, n).  residuals (k + 1, m): h(x_j) - y, angles wrapped; their norms
     residual_norms (k + 1,).  costs (k + 1,): p'R^-1 p if weighted, else p'p.  jacobians (k + 1, m, n).  steps (k, n).
-    dampings (k,): the mu of each step, 0 without damping.  converged: the last step was shorter than the tolerance.
-    cov (n, n): the error covariance of x by linearisation there; NaN if the Jacobian is singular at x.
+    ranks (k,): n, or less where a step had to do without some directions.  dampings (k,): the mu of each step, 0
+    without damping.  converged: the last step was complete and shorter than the tolerance.  cov (n, n): the error
+    covariance of x by linearisation there; NaN if the Jacobian is singular at x.
     """
 
     x: Array
@@ -36,14 +35,15 @@ class Solution(NamedTuple):
     costs: Array
     jacobians: Array
     steps: Array
+    ranks: Array
     dampings: Array
 
 
 class Solutions(NamedTuple):
     """Many runs.  x (..., n), the last iterates; steps (...), whole numbers; converged, singular (...): flags.
 
-    singular: stopped at a singular Jacobian, so x is where that happened.  A run that neither converged nor was
-    stopped used up its iterations or went to infinity.  residual_norms (...); costs (...); cov (..., n, n) as in
+    singular: the Jacobian was singular at the start and no step was taken.  A run that neither converged nor was
+    singular used up its iterations or went to infinity.  residual_norms (...); costs (...); cov (..., n, n) as in
     `Solution`, NaN where not converged.
     """
 
@@ -71,8 +71,10 @@ def gauss_newton(
     y (m,), x0 (n,), m >= n; tolerance in the state's units.  A step is counted when it is taken, and the test comes
     after it.  `damping` mu > 0 gives Levenberg-Marquardt: J'WJ + mu diag(J'WJ), mu divided by 10 after a step that
     lowers the cost and multiplied by 10 (and the step not taken) otherwise; `max_iterations` counts the trials.
-    ValueError for fewer measurements than unknowns, a singular Jacobian (without damping), a singular R (if
-    weighted), a wrong shape or NaN.  Running out of iterations is no error: see `converged`.
+    A later iterate with a singular Jacobian (far away all stations lie in one direction) is left by the shortest
+    step, which moves only in the directions that are measured; `ranks` tells, and it never counts as convergence.
+    ValueError for a singular Jacobian at the start (without damping), fewer measurements than unknowns, a singular R
+    (if weighted), a wrong shape or NaN.  Running out of iterations is no error: see `converged`.
     MAT (2.4)-(2.6), Algorithms 1 and 2, 2.3.2 note 2.
 
     >>> from core.sensors import Range
@@ -83,17 +85,18 @@ def gauss_newton(
     y, x0, L = _checked(sensor, y, x0, weighted, tolerance, max_iterations, damping)
     if y.ndim != 1 or x0.ndim != 1:
         raise ValueError(f"expected one y (m,) and one x0 (n,), got {y.shape} and {x0.shape}; see gauss_newton_batch")
-    path: list[tuple[Array, float]] = [(x0, 0.0)]
-    x, _, converged, singular = _iterate(sensor, y[None], x0[None], L, tolerance, max_iterations, damping, path)
-    iterates = np.stack([point for point, _ in path])
+    path: list[tuple[Array, int, float]] = [(x0, 0, 0.0)]
+    x, _, converged, singular = iterate(sensor, y[None], x0[None], L, tolerance, max_iterations, damping, path)
+    iterates = np.stack([point for point, _, _ in path])
     jacobians = np.array(sensor.jacobian(iterates))
     if singular[0]:
-        raise ValueError(_advice(jacobians[-1], len(iterates) - 1))
+        raise ValueError(_advice(jacobians[0]))
     residuals = -sensor.innovation(y, sensor.h(iterates))
     norms, costs = _sizes(residuals, L)
     return Solution(
         x[0], iterates, norms, bool(converged[0]), _covariance(jacobians[-1], sensor.R, L, weighted), residuals,
-        costs, jacobians, np.diff(iterates, axis=0), np.array([mu for _, mu in path[1:]]),
+        costs, jacobians, np.diff(iterates, axis=0), np.array([rank for _, rank, _ in path[1:]], dtype=int),
+        np.array([mu for _, _, mu in path[1:]]),
     )
 
 
@@ -126,7 +129,7 @@ def gauss_newton_batch(
         raise ValueError(f"x0: expected batch axes that fit y {y.shape}, got {x0.shape}") from None
     ys = np.broadcast_to(y, (*batch, m)).reshape(-1, m)
     starts = np.broadcast_to(x0, (*batch, n)).reshape(-1, n)
-    x, steps, converged, singular = _iterate(sensor, ys, starts, L, tolerance, max_iterations, damping, None)
+    x, steps, converged, singular = iterate(sensor, ys, starts, L, tolerance, max_iterations, damping, None)
     norms, costs = _sizes(-sensor.innovation(ys, sensor.h(x)), L)
     cov = _covariance(sensor.jacobian(x), sensor.R, L, weighted)
     cov = np.where(converged[:, None, None], cov, np.nan)
@@ -148,80 +151,20 @@ def basins(runs: Solutions, solutions: ArrayLike, radius: float = 1.0) -> Array:
     return np.where(reached, distances.argmin(axis=-1), -1)
 
 
-def _iterate(
-    sensor: Sensor, y: Array, x: Array, L: Array | None, tolerance: float, max_iterations: int,
-    damping: float | None, path: list[tuple[Array, float]] | None,
-) -> tuple[Array, Array, Array, Array]:
-    """x (B, n) after the iterations, steps, converged, singular (B,); `path` collects the steps of a single run."""
-    x = x.copy()
-    steps = np.zeros(len(x), dtype=int)
-    converged, singular = np.zeros(len(x), dtype=bool), np.zeros(len(x), dtype=bool)
-    mu = None if damping is None else np.full(len(x), damping)
-    active = np.arange(len(x))
-    for _ in range(max_iterations):
-        if not len(active):
-            break
-        xa, ya = x[active], y[active]
-        J = _whiten(L, sensor.jacobian(xa), True)
-        p = _whiten(L, -sensor.innovation(ya, sensor.h(xa)), False)
-        dx, bad = _step(J, p, None if mu is None else mu[active])
-        sound = ~bad & (np.abs(dx) < _LIMIT).all(axis=-1) & (np.abs(xa) < _LIMIT).all(axis=-1)
-        dx = np.where(sound[:, None], dx, 0.0)
-        taken, done = sound, sound & (np.sqrt(np.square(dx).sum(axis=-1)) < tolerance)
-        if mu is not None:
-            p_new = _whiten(L, -sensor.innovation(ya, sensor.h(xa + dx)), False)
-            taken = sound & (np.square(p_new).sum(axis=-1) <= np.square(p).sum(axis=-1))
-            done &= ~taken | (mu[active] <= 1e-3)         # a short step proves little while the damping is strong
-        x[active] = np.where(taken[:, None], xa + dx, xa)
-        steps[active] += taken
-        converged[active] = done
-        singular[active] = bad
-        if path is not None and taken[0]:
-            path.append((x[0].copy(), 0.0 if mu is None else float(mu[0])))
-        if mu is not None:
-            mu[active] = np.clip(np.where(taken, mu[active] / 10.0, mu[active] * 10.0), 1e-15, 1e15)
-        active = active[sound & ~done]
-    return x, steps, converged, singular
-
-
-def _step(J: Array, p: Array, mu: Array | None) -> tuple[Array, Array]:
-    """argmin |J dx + p|^2 + mu |D dx|^2 with D^2 = diag(J'J), and where there is none: (B, n), (B,)."""
-    if mu is not None:
-        sizes = np.sqrt(np.square(J).sum(axis=-2))
-        sizes = np.where(sizes > 0.0, sizes, 1.0)         # a state that nothing measures stays where it is
-        rows = (np.sqrt(mu)[:, None] * sizes)[..., None] * np.eye(J.shape[-1])
-        J = np.concatenate([J, rows], axis=-2)
-        p = np.concatenate([p, np.zeros((len(p), J.shape[-1]))], axis=-1)
-    factors = factorise(J, -p)
-    return back_substitute(factors), factors.singular
-
-
-def _whiten(L: Array | None, a: Array, matrix: bool) -> Array:
-    """R^(-1/2) a for a matrix (..., m, n) or a vector (..., m), R = L L'; a itself if not weighted.  Alg 2."""
-    if L is None:
-        return a
-    scale = np.diagonal(L)
-    if not np.tril(L, -1).any():
-        return a / (scale[:, None] if matrix else scale)
-    return np.linalg.solve(L, a) if matrix else solve_vectors(L, a)
-
-
 def _sizes(residuals: Array, L: Array | None) -> tuple[Array, Array]:
     """|p| in the measurement's units, and the cost."""
-    white = _whiten(L, residuals, False)
+    white = whiten(L, residuals, False)
     return np.sqrt(np.square(residuals).sum(axis=-1)), np.square(white).sum(axis=-1)
 
 
 def _covariance(J: Array, R: Array, L: Array | None, weighted: bool) -> Array:
     """V(x) (..., n, n) by linearisation: (J'R^-1 J)^-1 or, not weighted, (2.6); NaN for a singular J."""
-    factors = factorise(_whiten(L, J, True))
-    G = inverse_gram(factors)
+    G = inverse_gram(factorise(whiten(L, J, True)))
     if weighted:
         return G
-    good = ~factors.singular
-    if good.any():
-        G[good] = position_covariance(J[good], 1.0, R)    # (2.6)
-    return G
+    K = G @ J.mT
+    P = K @ R @ K.mT                                      # (2.6)
+    return 0.5 * (P + P.mT)
 
 
 def _checked(
@@ -243,10 +186,10 @@ def _checked(
     return y, x0, cholesky_positive("R", sensor.R) if weighted else None
 
 
-def _advice(J: Array, k: int) -> str:
+def _advice(J: Array) -> str:
     empty = np.flatnonzero(~J.any(axis=0)).tolist()
     why = f"nothing measures the components {empty} of the state" if empty else "its columns are dependent there"
     return (
-        f"x0: expected a start from which the Jacobian stays regular, got a singular one at iterate {k} ({why}); start "
-        f"elsewhere (not at a station or on the line through the stations), measure more, or give damping, e.g. 1e-3"
+        f"x0: expected a start with a regular Jacobian, got a singular one ({why}); start elsewhere (not at a station "
+        f"or on the line through the stations), measure more, or give damping, e.g. 1e-3"
     )

@@ -53,8 +53,10 @@ class LinearMotion:
         The result has contiguous components, out[..., i], whatever the layout of x.
         """
         x = self._state(x)
-        out = np.empty((x.shape[-1], *x.shape[:-1]))
-        u = rng.standard_normal(out.shape)
+        u = rng.standard_normal((x.shape[-1], *x.shape[:-1]))
+        if x.ndim == 1:
+            return self.Phi @ x + self.root @ u
+        out = np.empty_like(u)
         # Row by row with the zeros left out: both matrices are sparse, and each component is a plain vector.
         for i, row in enumerate(out):
             terms = [(self.Phi[i, j], x[..., j]) for j in np.flatnonzero(self.Phi[i])]

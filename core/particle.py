@@ -170,14 +170,15 @@ def _step(
         raise ValueError(f"y: expected one measurement ({len(sensor.R)},), got shape {y.shape}")
     N = len(x)
     blocks = spans(N)
-    propose, key = block_proposal(proposal, y, motion, sensor), stream_key(rng)
+    propose = block_proposal(proposal, y, motion, sensor)
+    key = stream_key(rng) if len(blocks) > 1 else None     # one block draws from rng itself
     predicted, w = np.empty(x.shape[::-1]).T, np.empty(N)
     log_w = None if threshold == 1.0 else np.empty(N)      # needed only if the cloud may go on weighted
 
     def propose_and_weigh(k: int) -> tuple[Piece, float]:
         block = blocks[k]
         with np.errstate(all="ignore"):                    # what is not finite is found and named by `weigh`
-            log_factor = propose(x[block], stream(key, k), predicted[block])
+            log_factor = propose(x[block], stream(key, k) if key else rng, predicted[block])
             before, total = log_weights(w_prev[block]) if log_w_prev is None else (log_w_prev[block], 0.0)
             if log_w is not None:
                 np.add(log_factor, before, out=log_w[block])
@@ -216,7 +217,7 @@ def _resample(
 
     def take(rows: slice, ancestors: Indices) -> None:
         for column, target in zip(x.T, out, strict=True):
-            np.take(column, ancestors, out=target[rows], mode="clip")
+            column.take(ancestors, out=target[rows], mode="clip")
 
     if resampler == "systematic":                          # of most use for large clouds, and gathered as it is found
         ancestors = comb(w, 1.0 - rng.random(), threads, take)

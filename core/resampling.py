@@ -15,6 +15,7 @@ still needed (erratum M22).
 
 import math
 from collections.abc import Callable
+from itertools import accumulate
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -204,14 +205,13 @@ def _cumulative(w: Array, threads: int | None = None) -> tuple[NDArray[np.int64]
         np.cumsum(C[block], out=C[block])
         return int(C[block.stop - 1])
 
-    totals = for_each(local, blocks, threads)
-    before = np.cumsum([0, *totals])
+    ends = list(accumulate(for_each(local, blocks, threads)))
 
     def shift(k: int) -> None:
-        C[blocks[k]] += before[k]
-        if before[k + 1] > one:                            # the weights' sum was a round-off above 1
-            np.minimum(C[blocks[k]], one, out=C[blocks[k]])
+        C[blocks[k]] += ends[k - 1]
 
-    for_each(shift, range(len(blocks)), threads)
-    C[np.searchsorted(C, min(int(before[-1]), one)):] = one
+    for_each(shift, range(1, len(blocks)), threads)
+    if ends[-1] > one:                                    # the weights' sum was a round-off above 1
+        np.minimum(C, one, out=C)
+    C[np.searchsorted(C, C[-1]):] = one
     return C, s

@@ -204,7 +204,7 @@ class SquaredRange:
 
     def log_likelihood(self, y: Array, x: Array) -> Array:
         """log of the non-central chi-square density with d degrees of freedom at y / sigma^2, shape (...)."""
-        from scipy.special import gammaln, ive
+        from scipy.special import gammaln, ive, xlogy
 
         half = len(self.station_m) / 2
         t = vector("y", y, 1)[..., 0] / self.sigma_m**2
@@ -212,12 +212,10 @@ class SquaredRange:
             raise ValueError(f"y: expected squared distances >= 0, got {t.min() * self.sigma_m**2}")
         lam = self._squares(x)[..., 0] / self.sigma_m**2
         t, lam = np.broadcast_arrays(t, lam)
-        with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            z = np.sqrt(lam * t)
-            # I_v(z) exp(-z) for v = d/2 - 1, and its limit (z/2)^v / Gamma(v + 1) near 0
-            bessel = np.where(z > 1e-8, np.log(ive(half - 1, z)) + z,
-                              (half - 1) * np.log(z / 2) - gammaln(half))
-            out = -math.log(2.0) - (t + lam) / 2 + (half / 2 - 0.5) * np.log(t / lam) + bessel
-            central = (half - 1) * np.log(t) - t / 2 - half * math.log(2.0) - gammaln(half)
-        out = np.where((lam > 0) & (t > 0), out, central - lam / 2)
-        return out - 2 * math.log(self.sigma_m)
+        central = xlogy(half - 1, t) - (t + lam) / 2 - half * math.log(2.0) - gammaln(half)
+        z = np.sqrt(lam * t)
+        near = z < 1e-6                                   # there the Bessel function is (z/2)^v / Gamma(v + 1)
+        safe_t, safe_lam, safe_z = (np.where(near, 1.0, v) for v in (t, lam, z))
+        bessel = np.log(ive(half - 1, safe_z)) + safe_z   # log I_v(z) for v = d/2 - 1
+        out = -math.log(2.0) - (t + lam) / 2 + (half - 1) / 2 * np.log(safe_t / safe_lam) + bessel
+        return np.where(near, central, out) - 2 * math.log(self.sigma_m)

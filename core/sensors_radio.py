@@ -124,7 +124,9 @@ class Fingerprint(StepFunction):
         index = self.nearest_point(x)
         if at_points.ndim == 1:
             return at_points[index]
-        return np.take_along_axis(at_points, index[..., None], axis=-1)[..., 0]
+        shape = np.broadcast_shapes(at_points.shape[:-1], index.shape)
+        at_points = np.broadcast_to(at_points, (*shape, at_points.shape[-1]))
+        return np.take_along_axis(at_points, np.broadcast_to(index, shape)[..., None], axis=-1)[..., 0]
 
     def point_log_likelihoods(self, y: Array) -> Array:
         """log p(y | x = p_i) for every point, shape (..., k)."""

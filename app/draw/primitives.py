@@ -11,6 +11,7 @@ from core.types import Array
 from lessons.kit.scene import Camera, Plane
 
 PICTURE_HEIGHT = 900.0  # sizes in the kit are pixels of a picture this high
+TEXT_SIZE = 1.2  # of viser's own size, so that the last row of a lecture hall can read it
 
 Kind = Literal["lines", "points", "arrows", "mesh", "label", "image"]
 
@@ -104,7 +105,7 @@ def label(name: str, text: str, position: Sequence[float], style: Style, size: f
     """Text of constant size on the screen."""
     x, y, z = (float(v) for v in position)
     return Primitive(name, "label", {
-        "text": text, "font_size_mode": "screen", "font_screen_scale": size * style.text, "depth_test": False,
+        "text": text, "font_size_mode": "screen", "font_screen_scale": TEXT_SIZE * size * style.text, "depth_test": False,
         "anchor": ANCHORS[anchor],
     }, (x, y, z))
 

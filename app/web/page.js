@@ -87,8 +87,18 @@
       }
     }
   };
+  // The line that is executed now stays in sight.
+  let lastNow = "";
+  const followNow = () => {
+    const now = document.querySelector(".pk-now");
+    const name = now?.querySelector(".pk-eq-name")?.textContent ?? "";
+    if (now && name !== lastNow && now.offsetParent !== null) now.scrollIntoView({ block: "nearest" });
+    lastNow = name;
+  };
+
   let naming = 0;
   new MutationObserver(() => {
+    followNow();
     clearTimeout(naming);
     naming = setTimeout(nameInputs, 120);
   }).observe(document.body, { childList: true, subtree: true });

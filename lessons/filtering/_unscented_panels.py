@@ -94,7 +94,7 @@ class Layout:
 
 
 def layout(p: "Params", r: "Result") -> Layout:
-    """The plane of positions where it is: polar, it is the image, below the prior; else the prior, left of the image."""
+    """The plane of positions keeps its place: it is the image, below the prior (polar), or the prior, at the left."""
     prior_box = _box(r.prior, SIDES)
     images = _hull(np.quantile(r.cloud_images, (0.04, 0.96), axis=0), r.ut.images,
                    *(_box(g, RADIUS_68) for g in (r.linear, r.sampled, Gaussian(r.ut.mean, r.ut.cov))))

@@ -68,16 +68,22 @@ def chart(*traces: Any, cursor: float | None = None, marks: Sequence[float] = ()
             found["range"] = [float(np.log10(v)) if log else float(v) for v in limits]
         return found
 
-    figure = go.Figure(data=list(traces), layout={"xaxis": axis(log_x, x_range), "yaxis": axis(log_y, y_range)})
+    shapes = [_upright(at, "mark", 1.5, "dot") for at in marks]
+    if cursor is not None:
+        shapes.append(_upright(cursor, "cursor", 2, "solid"))
+    figure = go.Figure(data=list(traces), layout={"xaxis": axis(log_x, x_range), "yaxis": axis(log_y, y_range),
+                                                  "shapes": shapes})
     if categories:
         figure.layout.xaxis.type = "category"
     if equal:
         figure.layout.yaxis.scaleanchor = "x"
-    for at in marks:
-        figure.add_vline(x=float(at), name="mark", line={"width": 1.5, "dash": "dot"})
-    if cursor is not None:
-        figure.add_vline(x=float(cursor), name="cursor", line={"width": 2})
     return figure
+
+
+def _upright(at: float, name: str, width: float, dash: str) -> dict[str, Any]:
+    """A vertical line over the whole height; plotly's own add_vline takes ten times as long."""
+    return {"type": "line", "x0": float(at), "x1": float(at), "y0": 0, "y1": 1, "xref": "x", "yref": "y domain",
+            "name": name, "line": {"width": width, "dash": dash}}
 
 
 def _plain(values: Numbers) -> np.ndarray:

@@ -56,10 +56,6 @@ def states(n, shape=(), seed=0):
     return np.random.default_rng(seed).uniform(-60, 60, (*shape, n))
 
 
-def n_of(name):
-    return 4
-
-
 def a_measurement(name, x):
     """A measurement that is possible at x."""
     y = ALL[name].h(x)
@@ -291,7 +287,7 @@ def test_linear_likelihood_with_correlated_noise():
     y1, y2 = np.meshgrid(np.linspace(-12, 12, 301), np.linspace(-12, 12, 301), indexing="ij")
     y = np.stack([y1, y2], axis=-1)
     p = np.exp(sensor.log_likelihood(y + sensor.h(x), x))
-    assert p.sum() * (24 / 300) ** 2 == pytest.approx(1.0, rel=1e-9)
+    assert p.sum() * (24 / 300) ** 2 == pytest.approx(1.0, rel=1e-8)
     moments = np.einsum("abi,abj,ab->ij", y, y, p) * (24 / 300) ** 2
     np.testing.assert_allclose(moments, sensor.R, atol=1e-6)
 

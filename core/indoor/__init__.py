@@ -1,0 +1,1 @@
+"""Positioning on the graph of a building."""
