@@ -33,4 +33,6 @@ $(VENV)/.run: pyproject.toml constraints.txt | $(VENV)/bin/python
 
 $(VENV)/.test: pyproject.toml constraints.txt | $(VENV)/bin/python
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --editable ".[test,export]"
+	@# a peer for the benchmarks that runs on numpy 2 but does not say so
+	$(BIN)/python -m pip install --quiet --disable-pip-version-check --no-deps particles==0.4
 	@touch $@ $(VENV)/.run

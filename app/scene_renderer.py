@@ -78,7 +78,7 @@ def _same_shape(old: Primitive, new: Primitive) -> bool:
 def _assign(node: Any, old: Primitive, new: Primitive) -> None:
     for key, value in new.props.items():
         before = old.props[key]
-        if value is not before and not (isinstance(value, np.ndarray) and np.array_equal(value, before)):
+        if not (np.array_equal(value, before) if isinstance(value, np.ndarray) else value == before):
             setattr(node, key, value)
     if new.position != old.position:
         node.position = new.position

@@ -106,7 +106,7 @@ def combine(pieces: Sequence[Piece]) -> Summary:
     for s, p in zip(shares, pieces, strict=True):
         delta = p.c - mean                                # x - mean = (x - c) + delta
         cross = (p.first + 0.5 * p.total * delta)[:, None] * delta
-        cov += s * (p.second + cross + cross.T)
+        cov += s * (p.second + (cross + cross.T))
     n_eff = 1.0 / math.fsum(s * s * p.squares for s, p in zip(shares, pieces, strict=True))
     return Summary(top + math.log(S), n_eff, mean, cov, shares)
 

@@ -118,14 +118,13 @@ def correct(
     """The update for a given innovation nu (..., m) and linearisation H (..., m, n), R (..., m, m)."""
     x, P = prior
     C = shared(H)
-    single = P.ndim == 2 == C.ndim and (missing is None or missing.ndim == 1)
-    dot = np.ndarray.dot if single else times
-    HP = dot(C, P)
-    S = dot(HP, C.mT) + R                                 # MAT exercise 3.1
+    HP = times(C, P)
+    S = times(HP, C.mT) + R                               # MAT exercise 3.1
     if missing is None:
         K = solve_spd(S, HP).mT                           # (3.12)
     else:
         K = solve_spd(*without(missing, S, HP)).mT
+    dot = np.ndarray.dot if K.ndim == 2 else times
     B = P - dot(K, HP)                                    # (I - K H) P
     # B + (K R - B H') K' is (3.10), (I - K H) P (I - K H)' + K R K' for any K, with two products less.
     P_post = symmetric(B + dot(dot(K, R) - dot(B, C.mT), K.mT))

@@ -44,11 +44,11 @@ def figures(p: "Params", r: "Result") -> dict:
 
 
 def readouts(p: "Params", r: "Result") -> list[Readout]:
-    """How far the mean and the covariance are off, and whether the covariance is one."""
+    """How far the mean and the covariance are off (to a nanometre), and whether the covariance is one."""
     return [
-        Readout("ut_mean_error", r.ut_errors.mean_m, "m", 3),
-        Readout("linear_mean_error", r.linear_errors.mean_m, "m", 3),
-        Readout("sampled_mean_error", r.sampled_errors.mean_m, "m", 3),
+        Readout("ut_mean_error", round(r.ut_errors.mean_m, 9), "m", 3),
+        Readout("linear_mean_error", round(r.linear_errors.mean_m, 9), "m", 3),
+        Readout("sampled_mean_error", round(r.sampled_errors.mean_m, 9), "m", 3),
         Readout("ut_cov_error", r.ut_errors.cov_percent, "%", 3),
         Readout("linear_cov_error", r.linear_errors.cov_percent, "%", 3),
         Readout("spread", float(np.sqrt(2.0 + p.kappa))),

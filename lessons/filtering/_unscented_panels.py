@@ -116,8 +116,8 @@ def layout(p: "Params", r: "Result") -> Layout:
         image = Panel(*inner, np.array([high[0] + 0.24 * side, low[1] + 0.5 * (high[1] - low[1] - side)]),
                       np.array([side, side]))
     (x0, y0), (x1, y1) = _hull(*((panel.corner, panel.corner + panel.size) for panel in (source, image)))
-    pixel = max((y1 - y0) / 680.0, (x1 - x0) / 1100.0)
-    camera = Plane((x0 - 62.0 * pixel, x1 + 20.0 * pixel), (y0 - 120.0 * pixel, y1 + 100.0 * pixel), axes=False)
+    pixel = max((y1 - y0) / 760.0, (x1 - x0) / 1100.0)
+    camera = Plane((x0 - 62.0 * pixel, x1 + 20.0 * pixel), (y0 - 60.0 * pixel, y1 + 72.0 * pixel), axes=False)
     return Layout(source, image, pixel, camera)
 
 

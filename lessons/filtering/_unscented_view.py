@@ -125,7 +125,9 @@ def _dots(name: str, at: Array, weights: Array) -> list[Item]:
 
 
 def _names(name: str, letter: str, at: Array, weights: Array | None, pixel: float) -> list[Item]:
-    """A name beside every point, on its far side from the centre."""
+    """A name beside every point, on its far side from the centre; with the weight where there is room for it."""
+    if np.linalg.norm(at[1:] - at[0], axis=1).min() < 42.0 * pixel:
+        weights = None
     items: list[Item] = []
     for i, (x, y) in enumerate(at):
         text = letter + SUBSCRIPTS[i] + ("" if weights is None else f": {weights[i]:.2f}".replace("-", "−"))
@@ -148,10 +150,10 @@ def _caption(p: "Params", r: "Result") -> str:
 
 def _note(p: "Params", r: "Result", at: Moment) -> str:
     found = []
-    if r.ut.weights[0] < 0:
-        found.append("The centre has a negative weight.")
     if at.stage >= MOMENTS and not r.ut.definite:
-        found.append("The covariance of (3.16) is not positive semidefinite here and has no ellipse; the dashed one "
-                     "takes the deviations from f(χ₀) instead.")
-    found.append(f"{len(r.cloud):,} of {p.samples:,} Monte Carlo points are drawn; their moments use all.")
+        found.append("The covariance of (3.16) is not positive semidefinite: no ellipse. "
+                     "Dashed: deviations from f(χ₀) instead.")
+    elif r.ut.weights[0] < 0:
+        found.append("The centre has a negative weight.")
+    found.append(f"{len(r.cloud):,} of {p.samples:,} Monte Carlo points are drawn.")
     return " ".join(found)

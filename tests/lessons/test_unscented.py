@@ -109,7 +109,7 @@ def test_negative_weight_takes_the_covariance_away() -> None:
     np.testing.assert_allclose(r.ut.weights, [-3, 1, 1, 1, 1])
     assert np.linalg.eigvalsh(r.ut_cov)[0] < -1.0
     assert "ut_modified" in names(view) and "ut" not in names(view)
-    assert "negative weight" in view.note and "not positive semidefinite" in view.note
+    assert "not positive semidefinite" in view.note and "negative weight" in at(p, r, 1).note
     role = {item.name: getattr(item, "role", None) for item in view.scene}
     assert role["sigma_centre"] == "warning" and role["sigma_others"] == "sigma"
     assert {i.role for i in at(*result()).scene if i.name == "sigma_centre"} == {"sigma"}
