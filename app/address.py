@@ -17,12 +17,13 @@ class AddressBar:
         self._sent = ""
         self._sent_at = 0.0
         self._timer: threading.Timer | None = None
+        self._closed = False
 
     def show(self, query: str) -> None:
         """Make the address `query`, now or soon."""
         with self._lock:
             self._wanted = query
-            if self._timer is not None or query == self._sent:
+            if self._closed or self._timer is not None or query == self._sent:
                 return
             wait = self._sent_at + SECONDS_BETWEEN - time.monotonic()
             if wait > 0:
@@ -35,13 +36,14 @@ class AddressBar:
     def close(self) -> None:
         """Send nothing more."""
         with self._lock:
+            self._closed = True
             if self._timer is not None:
                 self._timer.cancel()
 
     def _late(self) -> None:
         with self._lock:
             self._timer = None
-            if self._wanted != self._sent:
+            if self._wanted != self._sent and not self._closed:
                 self._now()
 
     def _now(self) -> None:

@@ -79,12 +79,20 @@ class ResultCache:
 
 
 def size_of(value: Any) -> int:
-    """Bytes of the arrays inside records, sequences and mappings, plus a little for each object."""
+    """Bytes of the arrays inside records, sequences and mappings, each once, plus a little for each object."""
+    return _size(value, set())
+
+
+def _size(value: Any, seen: set[int]) -> int:
+    if id(value) in seen or isinstance(value, type):
+        return 0
+    seen.add(id(value))
     if isinstance(value, np.ndarray):
         return value.nbytes + 100
     if isinstance(value, dict):
-        return sum(size_of(v) for v in value.values()) + 100
+        return sum(_size(v, seen) for v in value.values()) + 100
     if isinstance(value, (tuple, list)):
-        return sum(size_of(v) for v in value) + 100
-    names = getattr(type(value), "__slots__", None) or getattr(value, "__dict__", None)
-    return 100 + sum(size_of(getattr(value, n)) for n in names if hasattr(value, n)) if names else 100
+        return sum(_size(v, seen) for v in value) + 100
+    slots = {name for kind in type(value).__mro__ for name in getattr(kind, "__slots__", ())}
+    names = slots | set(getattr(value, "__dict__", ()))
+    return 100 + sum(_size(getattr(value, n), seen) for n in names if hasattr(value, n))

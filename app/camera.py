@@ -69,7 +69,7 @@ class Room:
     text: float = 1.0
 
 
-def fit(camera: Camera, width: float, height: float, room: Room = Room()) -> Pose:  # noqa: B008
+def fit(camera: Camera, width: float, height: float, room: Room = Room()) -> Pose:
     """The pose that shows all of `camera` on a canvas of this size in pixels.
 
     A plane view stands at the top of the canvas, so that what is left over is below it.
@@ -169,7 +169,7 @@ class CameraController:
             position, look_at = self._reported
             if np.abs(position - look_at).max() < 1e-9:
                 return None
-            return CameraPose(*(tuple(self._space.scene(v).tolist()) for v in (position, look_at)))
+            return CameraPose(*(tuple(self._space.scene(v).tolist()) for v in (position, look_at))).rounded()
 
     def _at_sent(self) -> bool:
         if self._reported is None or self._sent is None:

@@ -133,6 +133,8 @@ def moments(entry: Entry, scenario: Scenario) -> list[tuple[int, int]]:
 
 def view_problems(view: View, scenario: Scenario, entry: Entry, words: Words) -> Iterator[str]:
     """What is wrong with one view: numbers, names, data."""
+    yield from (f"unused names {name!r}, which is no parameter"
+                for name in entry.lesson.unused_at(scenario.params) if name not in entry.parameters)
     for theme in (LIGHT, DARK):
         for primitive in lower(view, style_for(view.camera, theme)):
             for key, value in primitive.props.items():

@@ -28,7 +28,7 @@ class UsageError(Exception):
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command and return its exit code: 0 well, 1 something failed, 2 the command was wrong."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    if not given or given[0].startswith("-") and given[0] not in ("-h", "--help", "--version"):
+    if not given or (given[0].startswith("-") and given[0] not in ("-h", "--help", "--version")):
         given.insert(0, "serve")
     options = _parser().parse_args(given)
     logging.basicConfig(level=logging.INFO if getattr(options, "verbose", False) else logging.WARNING,
@@ -182,6 +182,8 @@ def _export(options: argparse.Namespace) -> int:
     elif options.figure is None:
         raise UsageError(f"--figure: .{kind} holds a plot; name one of {', '.join(view.figures)}")
     else:
+        import plotly.graph_objects as go
+
         from app.figure_renderer import themed
         from app.theme import LIGHT
 
@@ -189,8 +191,8 @@ def _export(options: argparse.Namespace) -> int:
         enlarge = size[1] / 480
         figure = themed(view.figures[options.figure], options.figure, words, LIGHT, size=enlarge, titled=True)
         if not options.transparent:
-            figure.update_layout(paper_bgcolor="white", plot_bgcolor="white")
-        figure_file.write(figure, options.to, size)
+            figure["layout"].update(paper_bgcolor="white", plot_bgcolor="white")
+        figure_file.write(go.Figure(figure), options.to, size)
     return 0
 
 

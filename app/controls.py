@@ -1,7 +1,7 @@
 """A lesson's parameters as widgets: events become changes of the scenario, the scenario sets the widgets."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -42,10 +42,11 @@ class Controls:
         """Ids of the sliders whose number field shows an exponent."""
         return [widget_id(self._widgets[p.name]) for p in self._parameters.values() if p.log]
 
-    def show(self, params: Any) -> None:
-        """Set the widgets to these parameters; only what differs is sent."""
+    def show(self, params: Any, unused: Collection[str] = ()) -> None:
+        """Set the widgets to these parameters and hide the unused ones; only what differs is sent."""
         for name, value in values(params).items():
             parameter, widget = self._parameters[name], self._widgets[name]
+            widget.visible = name not in unused
             if parameter.log:
                 if _from_log(parameter, widget.value) != value:
                     widget.value = _to_log(float(value))  # type: ignore[arg-type]
@@ -89,7 +90,8 @@ class Controls:
                 return self._gui.add_number(label, value, min=0, max=SEED_LIMIT, step=1, hint=hint)
         if p.log:
             low, high = _to_log(p.low), _to_log(p.high)
-            return self._gui.add_slider(label, low, high, 0.01, initial_value=_to_log(value), marks=_decades(p), hint=hint)
+            return self._gui.add_slider(label, low, high, 0.01, initial_value=_to_log(value), marks=_decades(p),
+                                        hint=hint)
         if p.kind == "int":
             return self._gui.add_slider(label, int(p.low), int(p.high), int(p.step or 1), value, hint=hint)
         return self._gui.add_slider(label, float(p.low), float(p.high), p.step or _nice_step(p), value, hint=hint)

@@ -1,12 +1,13 @@
 """A lesson's plots get the theme's colours and the words' titles, and go to their tabs."""
 
-import copy
 from collections.abc import Mapping
 from typing import Any
 
 import plotly.graph_objects as go
+from plotly.io.json import to_json_plotly
 
 from app.theme import Theme, css
+from app.web import adapter
 from lessons.kit.words import Words
 
 CONFIG = {
@@ -17,69 +18,65 @@ CONFIG = {
     "showSendToCloud": False,
     "plotlyServerURL": "",
 }
+EMPTY = go.Figure()
 FONT = "system-ui, 'Segoe UI', Roboto, 'DejaVu Sans', sans-serif"
 
 
 def themed(figure: go.Figure, name: str, words: Words, theme: Theme, *, size: float = 1.0,
-           titled: bool = False) -> go.Figure:
-    """A copy of the figure in the theme's colours, with the names of axes and traces from the words.
+           titled: bool = False) -> dict[str, Any]:
+    """The figure as plotly's JSON object, in the theme's colours, with the names of axes and traces from the words.
 
     size: enlargement of text and lines; titled: with the figure's title over it (on the screen its tab says it).
+    Plain dictionaries: plotly's own update methods take fifty times as long.
     """
-    found = go.Figure(copy.deepcopy(figure.to_dict()), skip_invalid=False)
-    for trace in found.data:
+    found = figure.to_dict()
+    for trace in found["data"]:
         _color_trace(trace, name, words, theme, size)
-    text = css(theme.text)
-    axis = {
-        "gridcolor": css(theme.grid), "zerolinecolor": css(theme.color("muted")), "linecolor": css(theme.color("muted")),
-        "tickfont": {"size": 12 * size}, "title": {"font": {"size": 13 * size}}, "automargin": True, "ticks": "outside",
-        "tickcolor": css(theme.color("muted")), "zerolinewidth": 1,
-    }
-    background = "rgba(0,0,0,0)"
+    layout, muted = found["layout"], css(theme.color("muted"))
+    for key in [k for k in layout if k.startswith(("xaxis", "yaxis"))]:
+        layout[key] = {
+            "gridcolor": css(theme.grid), "zerolinecolor": muted, "linecolor": muted, "tickcolor": muted,
+            "tickfont": {"size": 12 * size}, "automargin": True, "ticks": "outside", "zerolinewidth": 1,
+            "title": {"text": words.axis(name, key[0]), "font": {"size": 13 * size}}, **layout[key],
+        }
+    for shape in layout.get("shapes", ()):
+        line = shape.setdefault("line", {})
+        line["color"] = css(theme.color("warning" if shape.get("name") == "cursor" else "reference"))
+        line["width"] = line.get("width", 2) * size
+    layout.pop("template", None)
+    layout.update({
+        "paper_bgcolor": "rgba(0,0,0,0)", "plot_bgcolor": "rgba(0,0,0,0)",
+        "font": {"family": FONT, "size": 13 * size, "color": css(theme.text)},
+        "margin": {"l": 12, "r": 14, "t": (70 if titled else 46) * size, "b": 12},
+        "legend": {"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0, "font": {"size": 12 * size},
+                   "bgcolor": "rgba(0,0,0,0)"},
+        "modebar": {"bgcolor": "rgba(0,0,0,0)", "color": muted, "activecolor": css(theme.text)},
+        "showlegend": len(found["data"]) > 1, "bargap": 0.06, "hoverlabel": {"font": {"size": 12}},
+    })
     if titled:
-        found.update_layout(title={"text": words.label("figures", name), "font": {"size": 15 * size}, "x": 0.02,
-                                   "xanchor": "left", "y": 0.985, "yanchor": "top"})
-    found.update_layout(
-        paper_bgcolor=background, plot_bgcolor=background,
-        font={"family": FONT, "size": 13 * size, "color": text}, margin={"l": 12, "r": 14, "t": (70 if titled else 46) * size, "b": 12},
-        legend={"orientation": "h", "y": 1.02, "yanchor": "bottom", "x": 0, "font": {"size": 12 * size},
-                "bgcolor": "rgba(0,0,0,0)"},
-        hoverlabel={"font": {"size": 12}}, template="none", modebar={"bgcolor": "rgba(0,0,0,0)",
-                                                                    "color": css(theme.color("muted")),
-                                                                    "activecolor": text},
-        showlegend=len(found.data) > 1, bargap=0.06,
-    )
-    found.update_xaxes(**axis)
-    found.update_yaxes(**axis)
-    for key, update in (("x", found.update_xaxes), ("y", found.update_yaxes)):
-        if title := words.axis(name, key):
-            update(title_text=title)
-    for shape in found.layout.shapes or ():
-        shape.line.color = css(theme.color("warning" if shape.name == "cursor" else "reference"))
-        shape.line.width = (shape.line.width or 2) * size
+        layout["title"] = {"text": words.label("figures", name), "font": {"size": 15 * size}, "x": 0.02,
+                           "xanchor": "left", "y": 0.985, "yanchor": "top"}
     return found
 
 
-def _color_trace(trace: Any, figure: str, words: Words, theme: Theme, size: float) -> None:
-    meta = trace.meta
+def _color_trace(trace: dict[str, Any], figure: str, words: Words, theme: Theme, size: float) -> None:
+    meta = trace.get("meta")
     if not isinstance(meta, Mapping) or "role" not in meta:
         return
     role, color = meta["role"], css(theme.color(meta["role"]))
-    trace.name = words.trace(figure, meta.get("key", role), role)
-    if trace.type == "bar":
-        trace.marker.color = color
-        return
-    if trace.type not in ("scatter", "scattergl"):
-        return
-    if meta.get("fill"):
-        trace.fillcolor = css(theme.color(role), 0.18)
-        trace.line.color = "rgba(0,0,0,0)"
-        return
-    trace.line.color = color
-    trace.line.width = (trace.line.width or 2) * size
-    trace.marker.color = color
-    if trace.marker.size is not None and not hasattr(trace.marker.size, "__len__"):
-        trace.marker.size = trace.marker.size * size
+    trace["name"] = words.trace(figure, meta.get("key", role), role)
+    marker, line = trace.setdefault("marker", {}), trace.setdefault("line", {})
+    if trace["type"] == "bar":
+        del trace["line"]
+        marker["color"] = color
+    elif meta.get("fill"):
+        trace["fillcolor"] = css(theme.color(role), 0.18)
+        line["color"] = "rgba(0,0,0,0)"
+    else:
+        line.update(color=color, width=line.get("width", 2) * size)
+        marker["color"] = color
+        if isinstance(marker.get("size"), (int, float)):
+            marker["size"] *= size
 
 
 class FigureRenderer:
@@ -97,17 +94,15 @@ class FigureRenderer:
         if list(figures) != list(self._tabs):
             self.clear()
         for name, figure in figures.items():
-            ready = themed(figure, name, words, theme)
-            text = ready.to_json()
+            text = to_json_plotly({**themed(figure, name, words, theme), "config": CONFIG})
             if self._shown.get(name) == text:
                 continue
             self._shown[name] = text
-            if name in self._tabs:
-                self._tabs[name][1].figure = ready
-                continue
-            tab = self._panel.add_tab(words.label("figures", name))
-            with tab:
-                self._tabs[name] = (tab, self._gui.add_plotly(ready, config=CONFIG, aspect=0.72))
+            if name not in self._tabs:
+                tab = self._panel.add_tab(words.label("figures", name))
+                with tab:
+                    self._tabs[name] = (tab, self._gui.add_plotly(EMPTY, aspect=0.72))
+            adapter.set_plot(self._tabs[name][1], text)
 
     def clear(self) -> None:
         """Remove all tabs."""

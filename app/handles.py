@@ -1,6 +1,6 @@
 """Points that the user drags in the scene: the ray under the pointer meets the point's plane or sphere."""
 
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -52,10 +52,13 @@ class Handles:
         self._drawn: dict[str, tuple[Any, ...]] = {}
         self._space = Space((0.0, 0.0, 0.0), 1.0)
 
-    def show(self, params: Any, style: Style, space: Space) -> None:
-        """Put the balls where the parameters say."""
+    def show(self, params: Any, style: Style, space: Space, unused: Collection[str] = ()) -> None:
+        """Put the balls where the parameters say; there are none for the unused ones."""
         current, self._space = values(params), space
         for name, parameter in self._parameters.items():
+            if name in unused:
+                self._discard(name)
+                continue
             x, y, z = space.display(_in_space(current[name], style))
             at = (float(x), float(y), float(z))
             color, radius = style.theme.color(parameter.role), RADIUS * style.pixel * space.scale

@@ -11,7 +11,7 @@ from app.picture import SIZES
 from app.scenario import Scenario
 from app.text.markdown import to_html
 from app.text.numbers import equations_html, readouts_html
-from app.transport import Transport
+from app.transport import Transport, moves
 from app.web import adapter
 from lessons.kit.lesson import View
 from lessons.kit.words import SECTIONS, Words
@@ -206,7 +206,7 @@ class Page:
         timeline = entry.lesson.timeline_of(scenario.params)
         if timeline != self._built_timeline:
             self._built_timeline = timeline
-            self._transport_folder.visible = timeline.steps > 0
+            self._transport_folder.visible = moves(timeline)
             with self._transport_folder:
                 self.transport.rebuild(timeline, entry.words(scenario.language))
         self.transport.show(scenario)

@@ -4,6 +4,7 @@ A scenario round-trips through a query string in which only what differs from th
 """
 
 import math
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
@@ -33,7 +34,12 @@ class CameraPose:
     look_at: tuple[float, float, float]
 
     def format(self) -> str:
-        return ",".join(f"{v:.6g}" for v in (*self.position, *self.look_at))
+        return ",".join(f"{v!r}".removesuffix(".0") for v in (*self.position, *self.look_at))
+
+    def rounded(self) -> "CameraPose":
+        """The pose to about a hundred-thousandth of the distance looked at, so that the address stays short."""
+        digits = 5 - math.floor(math.log10(math.dist(self.position, self.look_at)))
+        return CameraPose(*(tuple(round(v, digits) for v in p) for p in (self.position, self.look_at)))
 
     @staticmethod
     def parse(text: str) -> "CameraPose":
@@ -43,7 +49,7 @@ class CameraPose:
         except ValueError:
             numbers = []
         if len(numbers) != 6 or not all(math.isfinite(v) and abs(v) < 1e9 for v in numbers):
-            raise ValueError(f"camera: expected six numbers x,y,z,x,y,z, got {text!r}")
+            raise ValueError(f"camera: expected six numbers x,y,z,x,y,z, got {text[:40]!r}")
         if math.dist(numbers[:3], numbers[3:]) < 1e-9:
             raise ValueError("camera: expected a position that differs from the point looked at")
         return CameraPose(tuple(numbers[:3]), tuple(numbers[3:]))  # type: ignore[arg-type]
@@ -131,11 +137,13 @@ def from_query(query: str, registry: Registry, fallback: str | None = None) -> t
     if len(query) > MAX_QUERY:
         problems.append(f"The address is longer than {MAX_QUERY} characters; the rest was ignored.")
         query = query[:MAX_QUERY].rpartition("&")[0]
-    given = dict(parse_qsl(query.lstrip("?"), keep_blank_values=True))
-    given = {name: text for name, text in given.items() if name not in VIEWER_NAMES}
+    pairs = parse_qsl(query.lstrip("?"), keep_blank_values=True)
+    given = {name: text for name, text in pairs if name not in VIEWER_NAMES}
+    counts = Counter(name for name, _ in pairs)
+    problems += [f"{name[:40]}: given more than once; the last one is used." for name in given if counts[name] > 1]
 
     entry = registry[fallback] if fallback else registry.first
-    lesson = given.pop("lesson", entry.id)
+    lesson = given.pop("lesson", entry.id)[:80]
     try:
         entry = registry[lesson]
     except KeyError as error:
@@ -162,14 +170,14 @@ def from_query(query: str, registry: Registry, fallback: str | None = None) -> t
         try:
             scenario = replace(scenario, camera=CameraPose.parse(camera))
         except ValueError as error:
-            problems.append(_sentence(str(error)))
+            problems.append(f"{error}.")
     return scenario, problems
 
 
 def _moment(scenario: Scenario, entry: Entry, step: str | None, stage: str | None, problems: list[str]) -> Scenario:
     timeline = entry.lesson.timeline_of(scenario.params)
     if step is None and stage is None:
-        return scenario
+        return with_moment(scenario, entry, *_first(entry, scenario))
     wanted, wanted_stage = timeline.first_shown.step, -1
     if step is not None:
         try:
@@ -178,7 +186,7 @@ def _moment(scenario: Scenario, entry: Entry, step: str | None, stage: str | Non
             problems.append(f"step: expected a whole number from 0 to {timeline.steps}, got {step[:40]!r}.")
         else:
             if not 0 <= wanted <= timeline.steps:
-                problems.append(f"step: expected a whole number from 0 to {timeline.steps}, got {wanted}.")
+                problems.append(f"step: expected a whole number from 0 to {timeline.steps}, got {step[:40]}.")
     if stage is not None:
         if stage in timeline.stages:
             wanted_stage = timeline.stages.index(stage)
@@ -191,7 +199,7 @@ def _read(parameter: Parameter, text: str) -> tuple[object, str]:
     try:
         value = parameter.parse(text)
     except ValueError as error:
-        return parameter.default, _sentence(str(error)) + f" The default {parameter.format(parameter.default)} is used."
+        return parameter.default, f"{error}. The default {parameter.format(parameter.default)} is used."
     try:
         return parameter.validate(value), ""
     except ValueError:

@@ -191,7 +191,8 @@ class Session:
         space = space_for(view.camera)
         self._scene.render(space.place(lower(view, style)))
         if self._handles is not None:
-            self._handles.show(scenario.params, style, space)
+            lesson = self._registry[scenario.lesson].lesson
+            self._handles.show(scenario.params, style, space, lesson.unused_at(scenario.params))
 
     def redraw_scene(self, view: View, scenario: Scenario) -> None:
         """The 3-D part as the client's own screen wants it."""
@@ -244,7 +245,7 @@ class Session:
         latest = self.scenario
         if latest.lesson != entry.id or self._page is None or self._controls is None:
             return
-        self._controls.show(latest.params)
+        self._controls.show(latest.params, entry.lesson.unused_at(latest.params))
         self._page.show_moment(latest, entry)
         adapter.call_page(self.client, "hideNumber", self._controls.log_ids)
         self._address.show(scenarios.to_query(latest, entry))

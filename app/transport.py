@@ -12,7 +12,14 @@ STEP_BACK, STAGE_BACK, STAGE_ON, STEP_ON = "\u25c2\u25c2 step", "\u25c2 stage", 
 PLAY, PAUSE = "\u25b6  Play", "\u275a\u275a  Pause"
 SPEEDS = {"1 step/s": 1.0, "2 steps/s": 2.0, "5 steps/s": 5.0, "10 steps/s": 10.0, "20 steps/s": 20.0}
 
+STAGE_SECONDS = 1.5
+
 Go = Callable[[int, int], None]
+
+
+def moves(timeline: Timeline) -> bool:
+    """Whether there is anything to play."""
+    return timeline.steps > 0 or len(timeline.stages) > 1
 
 
 class Transport:
@@ -26,7 +33,7 @@ class Transport:
         self._step, self._stage = 0, 0
         self._task: asyncio.Task[None] | None = None
         self._moves = gui.add_button_group("", (STEP_BACK, STAGE_BACK, STAGE_ON, STEP_ON),
-                                           hint="One step or one stage backwards or forwards (N and B, Shift+N, Shift+B)")
+                                           hint="Backwards or forwards: N and B, Shift+N and Shift+B")
         self._moves.on_click(self._moved)
         self._play = gui.add_button(PLAY)
         self._play.on_click(self._toggled)
@@ -45,15 +52,15 @@ class Transport:
             if widget is not None:
                 widget.remove()
         self._timeline, self._scrubber, self._stages = timeline, None, None
-        if timeline.steps == 0:
-            return
-        self._scrubber = self._gui.add_slider(self._label(), 0, timeline.steps, 1, 0)
+        if timeline.steps > 0:
+            self._scrubber = self._gui.add_slider(self._label(), 0, timeline.steps, 1, 0)
 
-        async def scrubbed(event: Any) -> None:
-            if event.client is not None:
-                self._go(int(self._scrubber.value), -1 if self._stage == len(timeline.stages) - 1 else self._stage)
+            async def scrubbed(event: Any) -> None:
+                if event.client is not None:
+                    last = self._stage == len(timeline.stages) - 1
+                    self._go(int(self._scrubber.value), -1 if last else self._stage)
 
-        self._scrubber.on_update(scrubbed)
+            self._scrubber.on_update(scrubbed)
         if len(timeline.stages) > 1:
             names = [words.label("stages", stage) for stage in timeline.stages]
             self._stages = self._gui.add_button_group("Stage", tuple(names))
@@ -93,7 +100,7 @@ class Transport:
         """Play, or stop playing; from the end it plays from the start.  Call it on the event loop."""
         if self.playing:
             self.stop()
-        elif self._timeline.steps > 0:
+        elif moves(self._timeline):
             self._play.label = PAUSE
             self._task = asyncio.get_running_loop().create_task(self._run())
 
@@ -105,14 +112,17 @@ class Transport:
 
     async def _run(self) -> None:
         try:
-            if self._step >= self._timeline.steps:
-                self._go(0, -1)
-            while self._step < self._timeline.steps:
-                await asyncio.sleep(1.0 / SPEEDS.get(self._speed.value, 5.0))
+            still = self._timeline.steps == 0  # then the stages are what plays
+            last = len(self._timeline.stages) - 1 if still else self._timeline.steps
+            at = self._stage if still else self._step
+            if at >= last:
+                at = -1
+            while at < last:
+                at += 1
+                self._go(*((0, at) if still else (at, -1)))
+                await asyncio.sleep(1.0 / SPEEDS.get(self._speed.value, 5.0) if not still else STAGE_SECONDS)
                 while not self._ready():
                     await asyncio.sleep(0.02)
-                self._go(self._step + 1, -1)
-                await asyncio.sleep(0)
         finally:
             self._play.label = PLAY
 

@@ -25,6 +25,8 @@ class LatestWins(Generic[T]):
     def submit(self, item: T) -> None:
         """Work on `item` next; an item that still waits is dropped."""
         with self._condition:
+            if self._closed:
+                return
             self._pending = item
             self._condition.notify_all()
 

@@ -93,7 +93,7 @@ def _cores() -> int:
 
 @cache
 def _pool(threads: int) -> "ThreadPoolExecutor":
-    from concurrent.futures import ThreadPoolExecutor     # imports logging: not while core is imported
+    from concurrent.futures import ThreadPoolExecutor  # imports logging: not while core is imported
 
     return ThreadPoolExecutor(threads, thread_name_prefix="paikka-block")
 

@@ -88,13 +88,13 @@ def multilaterate(stations_m: ArrayLike, ranges_m: ArrayLike, *, max_radius_m: f
 
 
 def _solve(s: Array, y: Array, signature: Array, limit: Array) -> ClosedForm:
-    """s (..., m, n), y (..., m); signature (k,): the signs in lambda = sum sign_j x_j^2."""
+    """s (..., m, n), y (..., m), broadcast; signature (k,): the signs in lambda = sum sign_j x_j^2."""
     n, clock = s.shape[-1], len(signature) > s.shape[-1]
-    size = np.maximum(np.abs(s).max(axis=(-2, -1)), np.abs(y).max(axis=-1))
+    size = np.abs(s).max(axis=(-2, -1))
     size = np.where(size > 0.0, size, 1.0)[..., None]     # unit of length: numbers near 1 keep the columns alike
     s1, y1 = s / size[..., None], y / size
-    origin = np.zeros((*s.shape[:-2], n))
     Q, R, bad = _factor(s1, y1, clock)
+    origin = np.zeros((*bad.shape, n))
     if bad.any():                                         # a line or plane through the origin: step off it
         center = s1.mean(axis=-2)
         spread, normals = np.linalg.svd(s1 - center[..., None, :], full_matrices=True)[1:]
@@ -108,7 +108,8 @@ def _solve(s: Array, y: Array, signature: Array, limit: Array) -> ClosedForm:
                 f"expected stations that are not in one point{' or on one line' if n > 2 else ''}, got positions and "
                 f"measurements whose equations have a rank below {len(signature)}"
             )
-    right = np.stack([np.ones(y.shape), np.square(s1).sum(axis=-1) - np.square(y1)], axis=-1)
+    squares = np.square(s1).sum(axis=-1) - np.square(y1)
+    right = np.stack([np.ones(squares.shape), squares], axis=-1)
     p, q = np.moveaxis(np.linalg.solve(R, Q.mT @ right), -1, 0)                       # p = A^+ 1, q = A^+ (...)
     a = np.vecdot(signature * p, p)
     b = 2.0 * np.vecdot(signature * p, q) - 1.0
@@ -117,7 +118,8 @@ def _solve(s: Array, y: Array, signature: Array, limit: Array) -> ClosedForm:
     solutions = p[..., None, :] * lambdas[..., None] + q[..., None, :]
     with np.errstate(divide="ignore", invalid="ignore"):
         middle = p * (-0.5 * b / a)[..., None] + q
-    shift = np.concatenate([origin, np.zeros((*origin.shape[:-1], len(signature) - n))], axis=-1)
+    origin = np.broadcast_to(origin, (*b.shape, n))
+    shift = np.concatenate([origin, np.zeros((*b.shape, len(signature) - n))], axis=-1)
     roots = (solutions + shift[..., None, :]) * size[..., None]
     x, bias = roots[..., :n], roots[..., n:] if clock else 0.0
     distances = np.sqrt(np.square(s[..., None, :, :] - x[..., None, :]).sum(axis=-1))
@@ -125,17 +127,21 @@ def _solve(s: Array, y: Array, signature: Array, limit: Array) -> ClosedForm:
     exists = np.isfinite(roots).all(axis=-1)
     sign_ok = exists & (y[..., None, :] >= bias).all(axis=-1)
     radius_ok = exists & (np.sqrt(np.square(x).sum(axis=-1)) <= limit[..., None])
-    unit = size[..., 0]
+    unit, p = size[..., 0], np.broadcast_to(p, q.shape)
     return ClosedForm(
         roots, sign_ok & radius_ok, np.sqrt(np.square(residuals).sum(axis=-1)), residuals, sign_ok, radius_ok,
-        lambdas * size**2, p / size, q * size, np.stack([a / unit**2, b, c * unit**2], axis=-1),
+        lambdas * size**2, p / size, q * size, np.stack(np.broadcast_arrays(a / unit**2, b, c * unit**2), axis=-1),
         np.where(np.isfinite(middle), middle + shift, np.nan) * size, origin * size,
     )
 
 
 def _factor(s: Array, y: Array, clock: bool) -> tuple[Array, Array, Array]:
     """A = Q R for the rows [2 s_i', -2 y_i], and where its columns are (nearly) dependent."""
-    A = 2.0 * (np.concatenate([s, -y[..., None]], axis=-1) if clock else s)
+    A = 2.0 * s
+    if clock:
+        batch = np.broadcast_shapes(s.shape[:-2], y.shape[:-1])
+        parts = [np.broadcast_to(a, (*batch, *a.shape[-2:])) for a in (A, -2.0 * y[..., None])]
+        A = np.concatenate(parts, axis=-1)
     Q, R = np.linalg.qr(A)
     new = np.abs(np.diagonal(R, axis1=-2, axis2=-1))
     bad = (new <= _SINGULAR * np.sqrt(np.square(A).sum(axis=-2))).any(axis=-1)
@@ -162,10 +168,10 @@ def _checked(kind: str, stations: ArrayLike, name: str, measured: ArrayLike, ext
         raise ValueError(f"{kind}_m: expected at least {n + extra} {kind} in {n} dimensions, got {m}")
     y = finite(name, measured, m)
     try:
-        batch = np.broadcast_shapes(s.shape[:-2], y.shape[:-1])
+        np.broadcast_shapes(s.shape[:-2], y.shape[:-1])
     except ValueError:
         raise ValueError(f"{name}: expected batch axes that fit {s.shape}, got {y.shape}") from None
-    return np.broadcast_to(s, (*batch, m, n)), np.broadcast_to(y, (*batch, m))
+    return s, y
 
 
 def _limit(max_radius_m: float) -> Array:

@@ -75,15 +75,10 @@ def weigh(log_factor: Array, before: Array | float, x: Array, w: Array) -> Piece
     np.subtract(log_w, peak, out=w)
     np.exp(w, out=w)
     c = x[best].copy()                                    # near the mean of the weighted cloud, so little cancels
-    d, e = x.T - c[:, None], np.empty(len(x))
-    first, second = np.empty(n), np.empty((n, n))
-    for k in range(n):
-        np.multiply(d[k], w, out=e)
-        first[k] = e.sum()
-        second[k, :k + 1] = second[:k + 1, k] = _inner(e, d[:k + 1])
+    first, second = _moments(w, x.T - c[:, None])
     if not np.isfinite(second).all():
         raise ValueError("particles: expected finite states, got NaN or infinity after the motion model")
-    squares = float(_inner(w, w[None])[0])
+    squares = float(np.einsum("b,b", w, w))
     return Piece(peak + float(before) if one else peak, float(w.sum()), squares, c, first, second)
 
 
@@ -111,8 +106,18 @@ def combine(pieces: Sequence[Piece]) -> Summary:
     return Summary(top + math.log(S), n_eff, mean, cov, shares)
 
 
-def _inner(a: Array, B: Array) -> Array:
-    """sum_b a_b B_jb: a (B,), B (j, B)."""
-    if len(a) <= 10_000:
-        return np.vecdot(a, B)
-    return np.einsum("b,jb->j", a, B)                     # for long vectors BLAS would start threads of its own
+def _moments(w: Array, d: Array) -> tuple[Array, Array]:
+    """sum w d (n,) and sum w d d' (n, n), for w (B,), d (n, B)."""
+    first, second = np.empty(len(d)), np.empty((len(d), len(d)))
+    if len(w) <= 10_000:                                  # short vectors: BLAS takes them on one thread
+        e = d * w
+        first[:] = np.vecdot(w, d)
+        for k in range(len(d)):
+            second[k, :k + 1] = second[:k + 1, k] = np.vecdot(e[k], d[:k + 1])
+    else:                                                 # long ones: BLAS would start threads beside ours
+        e = np.empty(len(w))
+        for k in range(len(d)):
+            np.multiply(d[k], w, out=e)
+            first[k] = e.sum()
+            second[k, :k + 1] = second[:k + 1, k] = np.einsum("b,jb->j", e, d[:k + 1])
+    return first, second

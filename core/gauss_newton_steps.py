@@ -38,7 +38,7 @@ def iterate(
         if mu is not None:
             p_new = whiten(L, -sensor.innovation(ya, sensor.h(xa + dx)), False)
             taken = sound & (np.square(p_new).sum(axis=-1) <= np.square(p).sum(axis=-1))
-            done &= ~taken | (mu[active] <= 1e-3)         # a short step proves little while the damping is strong
+            done &= ~taken | (mu[active] <= 1.0)          # a short step proves little while the damping is strong
         x[active] = np.where(taken[:, None], xa + dx, xa)
         steps[active] += taken
         converged[active] = done

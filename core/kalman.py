@@ -15,7 +15,6 @@ from core.sensors_linear import Linear, Position
 from core.stacks import Law, apply, congruence, is_finite, law, shared, solve_spd, symmetric, times, vector
 from core.types import Array, Gaussian, Motion, Sensor
 
-
 _LINEAR = (Linear, Position)                              # H at hand: no need to ask for h and its derivative
 
 

@@ -7,7 +7,6 @@ import numpy as np
 from core import checks
 from core.linalg import cholesky_psd
 from core.noise import Sampler, linear_sampler
-from core.noise import Sampler, linear_sampler
 from core.stacks import apply, frozen, is_finite
 from core.types import Array
 

@@ -88,7 +88,7 @@ def linear_sampler(Phi: ArrayLike, L: ArrayLike) -> Sampler:
     >>> out
     array([[7., 3.]])
     """
-    Phi, L = finite("Phi", Phi, None, None), finite("L", L, None, None)
+    Phi, L = np.asarray(Phi, dtype=np.float64), np.asarray(L, dtype=np.float64)
     if Phi.ndim != 2 or Phi.shape[0] != Phi.shape[1] or L.ndim != 2 or L.shape[0] != Phi.shape[0]:
         raise ValueError(f"Phi, L: expected shapes (n, n) and (n, r), got {Phi.shape} and {L.shape}")
     return _sampler(Phi.tobytes(), L.tobytes(), len(Phi))
@@ -97,7 +97,7 @@ def linear_sampler(Phi: ArrayLike, L: ArrayLike) -> Sampler:
 @lru_cache(maxsize=64)
 def _sampler(Phi_bytes: bytes, L_bytes: bytes, n: int) -> Sampler:
     """`linear_sampler`, prepared once for a model and not again at every step."""
-    Phi, L = (np.frombuffer(data).reshape(n, -1) for data in (Phi_bytes, L_bytes))
+    Phi, L = (finite(name, np.frombuffer(data).reshape(n, -1)) for name, data in (("Phi", Phi_bytes), ("L", L_bytes)))
     stay = (np.diagonal(Phi) == 1.0).all()                 # usual: then x + noise is one pass
     move, shake = _diagonals(Phi - np.eye(n) if stay else Phi), _diagonals(L.astype(np.float32))
 

@@ -13,6 +13,7 @@ from core.linalg import cholesky_psd
 from core.noise import standard_normal, stream, stream_key
 from core.proposals import Proposal, block_proposal
 from core.resampling import RESAMPLERS, Indices, comb, draw
+from core.stacks import vector
 from core.types import Array, Gaussian, Motion, Sensor
 
 __all__ = ["AllWeightsZero", "Proposal", "Run", "Step", "run", "step"]
@@ -165,7 +166,7 @@ def _step(
         raise ValueError(f"resampler: expected one of {', '.join(RESAMPLERS)}, got {resampler!r}")
     if not 0.0 <= threshold <= 1.0:
         raise ValueError(f"threshold: expected a fraction of N in [0, 1], got {threshold}")
-    y = finite("y", y, len(sensor.R))
+    y = vector("y", y, len(sensor.R))
     if y.ndim != 1:
         raise ValueError(f"y: expected one measurement ({len(sensor.R)},), got shape {y.shape}")
     N = len(x)

@@ -19,7 +19,7 @@ from core.types import Array, Gaussian
 
 
 class Walk(NamedTuple):
-    """points (..., n, 2) in metres; headings_deg (..., n - 1) of the steps; reset (..., n - 1): heading was set back."""
+    """points (..., n, 2) in metres; headings_deg (..., n - 1) of the steps; reset (..., n - 1): was it set back?"""
 
     points: Array
     headings_deg: Array
@@ -27,7 +27,7 @@ class Walk(NamedTuple):
 
 
 class Simulation(NamedTuple):
-    """walk; ys (n, ..., 2), the measured positions, time first; steps of the filter; errors (T, ..., 2), estimate - truth."""
+    """walk; ys (n, ..., 2) measured positions, time first; steps of the filter; errors (T, ..., 2) estimate - truth."""
 
     walk: Walk
     ys: Array

@@ -42,7 +42,7 @@ def plan(
     """
     x, P = law("initial", initial)
     given = P.shape[:-2]
-    if P.ndim > 2 and (first := P[(0,) * (P.ndim - 2)]).shape and (P == first).all():
+    if P.ndim > 2 and (first := P[(0,) * (P.ndim - 2)]).shape and (first == P).all():
         P = first                                         # one covariance for all runs, while the models allow it
     ys = np.asarray(ys, dtype=np.float64)
     if ys.ndim < 2 or not len(ys):

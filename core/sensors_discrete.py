@@ -89,7 +89,7 @@ class BinarySector(StepFunction):
         set_fields(self, stations_m=stations, R=frozen(np.eye(m) / 4))
         for name, low in (("radius_m", 0.0), ("sigma_m", 0.0), ("direction_rad", -math.inf), ("width_rad", 0.0)):
             value = frozen(per_row(name, getattr(self, name), m))
-            if (value < low).any() or name in ("radius_m", "width_rad") and not value.all():
+            if (value < low).any() or (name in ("radius_m", "width_rad") and not value.all()):
                 raise ValueError(f"{name}: expected numbers {'>=' if name == 'sigma_m' else '>'} 0, got {value.min()}")
             set_fields(self, **{name: value})
         if stations.shape[1] < 2 and (self.width_rad < 2 * math.pi).any():

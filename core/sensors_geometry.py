@@ -5,60 +5,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from core.distances import nonzero, offsets_to, rows_last, squared, squared_distances, unit_rows
 from core.sensor_noise import NormalNoise, derived, positions, set_fields, set_noise, state, wrap_angle
-from core.stacks import zero_stack, frozen
+from core.stacks import frozen, zero_stack
 from core.types import Array
-
-
-def offsets_to(x: Array, points: Array) -> list[Array]:
-    """x_j - s_ij for each coordinate j, shape (m, ...): rows first, so that the batch axes stay contiguous."""
-    extra = (1,) * (x.ndim - 1)
-    return [x[..., j] - points[:, j].reshape(-1, *extra) for j in range(points.shape[1])]
-
-
-def squared(offsets: list[Array]) -> Array:
-    """|x - s_i|^2, shape (m, ...)."""
-    total = offsets[0] * offsets[0]
-    for d in offsets[1:]:
-        total += d * d
-    return total
-
-
-def squared_distances(x: Array, points: Array) -> Array:
-    """|x - s_i|^2 for x (..., >= d) and points (m, d), shape (m, ...)."""
-    if x.ndim == 1:
-        return squared(offsets_to(x, points))
-    rows = np.empty((len(points), *x.shape[:-1]))
-    d = np.empty(x.shape[:-1])                            # two vectors in the cache instead of many in memory
-    for row, point in zip(rows, points, strict=True):
-        np.subtract(x[..., 0], point[0], out=row)
-        np.multiply(row, row, out=row)
-        for j in range(1, len(point)):
-            np.subtract(x[..., j], point[j], out=d)
-            np.multiply(d, d, out=d)
-            np.add(row, d, out=row)
-    return rows
-
-
-def _nonzero(r: Array) -> Array:
-    """r with 1 in the place of 0, so that 0 / r is 0 at a station."""
-    return np.where(r > 0, r, 1.0)
-
-
-def rows_last(rows: Array) -> Array:
-    """(m, ...) -> (..., m) without copying."""
-    return np.moveaxis(rows, 0, -1)
-
-
-def _unit_rows(x: Array, points: Array) -> tuple[Array, Array]:
-    """(x - s_i) / |x - s_i| as (..., m, n) with zero columns after the position, and |x - s_i| as (m, ...)."""
-    offsets = offsets_to(x, points)
-    r = np.sqrt(squared(offsets))
-    J = zero_stack(x.shape[:-1], len(points), x.shape[-1])
-    scale = 1.0 / _nonzero(r)
-    for j, d in enumerate(offsets):
-        J[..., j] = rows_last(d * scale)
-    return J, r
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,7 +39,7 @@ class Range(NormalNoise):
 
     def jacobian(self, x: Array) -> Array:
         """(x - s_i)' / |x - s_i|, shape (..., m, n); a zero row at the station itself."""
-        return _unit_rows(state(x, self.stations_m.shape[1]), self.stations_m)[0]
+        return unit_rows(state(x, self.stations_m.shape[1]), self.stations_m)[0]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,7 +75,7 @@ class Pseudorange(NormalNoise):
     def jacobian(self, x: Array) -> Array:
         """[(x - s_i)' / |x - s_i|, 1], shape (..., m, n); zero direction at the satellite itself."""
         d = self.satellites_m.shape[1]
-        J, _ = _unit_rows(state(x, d + 1), self.satellites_m)
+        J, _ = unit_rows(state(x, d + 1), self.satellites_m)
         J[..., d] = 1.0
         return J
 
@@ -161,7 +111,7 @@ class RangeDifference(NormalNoise):
 
     def jacobian(self, x: Array) -> Array:
         """Difference of the unit vectors from both stations, shape (..., m, n)."""
-        J, _ = _unit_rows(state(x, self.stations_m.shape[1]), self.stations_m)
+        J, _ = unit_rows(state(x, self.stations_m.shape[1]), self.stations_m)
         return J[..., :1, :] - J[..., 1:, :]
 
 
@@ -200,7 +150,7 @@ class Bearing(NormalNoise):
         """[north, -east] / (east^2 + north^2), shape (..., m, n), in rad/m; a zero row at the station itself."""
         x = state(x, 2)
         east, north = offsets_to(x, self.stations_m[:, :2])
-        scale = 1.0 / _nonzero(east * east + north * north)
+        scale = 1.0 / nonzero(east * east + north * north)
         J = zero_stack(x.shape[:-1], len(self.stations_m), x.shape[-1])
         J[..., 0] = rows_last(north * scale)
         J[..., 1] = rows_last(-east * scale)
@@ -241,7 +191,7 @@ class RangeRate(NormalNoise):
         d = self.stations_m.shape[1]
         x = state(x, 2 * d)
         offsets, speeds = offsets_to(x, self.stations_m), offsets_to(x[..., d:2 * d], self.velocities_mps)
-        r = _nonzero(np.sqrt(squared(offsets)))
+        r = nonzero(np.sqrt(squared(offsets)))
         return x, offsets, speeds, r, sum(p * u for p, u in zip(offsets, speeds, strict=True)) / r
 
     def h(self, x: Array) -> Array:

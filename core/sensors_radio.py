@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from core import checks
+from core.distances import offsets_to, rows_last, squared, squared_distances
 from core.sensor_noise import NormalNoise, StepFunction, derived, per_row, positions, set_fields, set_noise, state
-from core.sensors_geometry import offsets_to, rows_last, squared, squared_distances
-from core.stacks import frozen, zero_stack
+from core.stacks import frozen, vector, zero_stack
 from core.types import Array
 
 
@@ -68,6 +68,7 @@ class SignalStrength(NormalNoise):
         missing = np.isnan(y)
         if not missing.any():
             return NormalNoise.log_likelihood(self, y, x)
+        vector("y", np.where(missing, 0.0, y), len(self.R))
         z = np.where(missing, 0.0, self.innovation(y, self.h(x)) * self.precision)
         constants = np.log(self.precision) - 0.5 * math.log(2 * math.pi)
         return np.where(missing, 0.0, constants).sum(axis=-1) - 0.5 * np.square(z).sum(axis=-1)

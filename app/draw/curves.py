@@ -108,7 +108,7 @@ def stations(item: scene.Stations, style: Style) -> list[Primitive]:
     every = (faces + 4 * np.arange(len(p))[:, None, None]).reshape(-1, 3)
     found = [draw.mesh(item.name, vertices, every, style.theme.color(item.role))]
     names = zip(item.labels, p, strict=False)
-    found += [draw.label(f"{item.name}.label{i}", name, at + [0, -1.6 * r, 0], style, 1.0, "top")
+    found += [draw.label(f"{item.name}.label{i}", name, at - np.array([0, 1.6 * r, 0]), style, 1.0, "top")
               for i, (name, at) in enumerate(names)]
     return found
 

@@ -64,7 +64,8 @@ def points(name: str, positions: Array, color: Rgb | Array, size: float, style: 
     """Dots (n, 3); size is their diameter in pixels of the standard picture."""
     return Primitive(name, "points", {
         "points": np.asarray(positions, np.float64), "colors": np.asarray(color, np.uint8),
-        "point_size": size * style.pixel * style.dots, "point_shape": shape, "precision": "float32", "point_shading": "flat",
+        "point_size": size * style.pixel * style.dots, "point_shape": shape, "precision": "float32",
+        "point_shading": "flat",
     })
 
 
@@ -105,8 +106,8 @@ def label(name: str, text: str, position: Sequence[float], style: Style, size: f
     """Text of constant size on the screen."""
     x, y, z = (float(v) for v in position)
     return Primitive(name, "label", {
-        "text": text, "font_size_mode": "screen", "font_screen_scale": TEXT_SIZE * size * style.text, "depth_test": False,
-        "anchor": ANCHORS[anchor],
+        "text": text, "font_size_mode": "screen", "font_screen_scale": TEXT_SIZE * size * style.text,
+        "depth_test": False, "anchor": ANCHORS[anchor],
     }, (x, y, z))
 
 

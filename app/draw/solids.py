@@ -117,7 +117,7 @@ def satellites(item: scene.Satellites, style: Style) -> list[Primitive]:
     one = np.concatenate([cube + 8 * k for k in range(3)])
     faces = (one + 24 * np.arange(len(p))[:, None, None]).reshape(-1, 3)
     found = [draw.mesh(item.name, (p[:, None] + body).reshape(-1, 3), faces, style.theme.color(item.role))]
-    found += [draw.label(f"{item.name}.label{i}", name, at + [0, 0, 2.2 * r], style)
+    found += [draw.label(f"{item.name}.label{i}", name, at + np.array([0, 0, 2.2 * r]), style)
               for i, (name, at) in enumerate(zip(item.labels, p, strict=False))]
     return found
 

@@ -61,8 +61,11 @@ def significant(value: float, digits: int) -> str:
     return _sign(f"{value:.{places}f}")
 
 
+SUPERSCRIPTS = str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079")
+
+
 def _superscript(number: int) -> str:
-    return str(number).translate(str.maketrans("-0123456789", "\u207b\u2070\u00b9\u00b2\u00b3\u2074\u2075\u2076\u2077\u2078\u2079"))
+    return str(number).translate(SUPERSCRIPTS)
 
 
 def _piece(piece: object, digits: int) -> str:

@@ -1,4 +1,6 @@
-"""Everything that reaches behind viser's public interface, pinned to 1.1.1; `tests/app/test_adapter.py` is its contract.
+"""Everything that reaches behind viser's public interface, pinned to 1.1.1.
+
+The contract is `tests/app/test_adapter.py`.
 
 Why each is needed: viser listens to any origin, opens public tunnels on a client's word, lets a client set any
 attribute of a widget, and has no way to read or write the page's address.
@@ -104,6 +106,11 @@ def wait_drawn(client: viser.ClientHandle, with_text: bool, timeout: float) -> b
             return True
         time.sleep(0.1)
     return False
+
+
+def set_plot(handle: Any, figure_json: str) -> None:
+    """Show a plotly figure that is JSON already; viser's own setter takes a Figure and encodes it twice."""
+    handle._plotly_json_str = figure_json
 
 
 def widget_id(handle: Any) -> str:

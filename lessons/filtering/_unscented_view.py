@@ -125,8 +125,9 @@ def _dots(name: str, at: Array, weights: Array) -> list[Item]:
 
 
 def _names(name: str, letter: str, at: Array, weights: Array | None, pixel: float) -> list[Item]:
-    """A name beside every point, on its far side from the centre; with the weight where there is room for it."""
-    if np.linalg.norm(at[1:] - at[0], axis=1).min() < 42.0 * pixel:
+    """A name beside every point, away from the centre; with the weight where there is room or a negative one."""
+    near = np.linalg.norm(at[1:] - at[0], axis=1).min() < 42.0 * pixel
+    if near and weights is not None and weights[0] >= 0:
         weights = None
     items: list[Item] = []
     for i, (x, y) in enumerate(at):

@@ -16,7 +16,7 @@ from lessons.kit.lesson import Lesson, Progress, Timeline
 from lessons.kit.params import Point, choice, draggable, seed, slider
 
 DRAWN = 1000                                 # of the Monte Carlo points
-AWAY = {"station_1": (-60.0, -5000.0), "station_2": (60.0, -5000.0)}     # powers need no stations: out of the picture
+UNUSED = {"polar": ("degree", "station_2"), "two_ranges": ("degree",), "polynomial": ("station_1", "station_2")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,8 +31,8 @@ class Params:
     correlation: float = slider(0.0, low=-0.95, high=0.95, step=0.05, group="more")
     root: str = choice("cholesky", ("cholesky", "symmetric"), group="more")
     degree: int = slider(2, low=1, high=6, group="more")
-    station_1: Point = draggable((0.0, 0.0), low=-5000.0, high=5000.0, unit="m", role="station", group="more")
-    station_2: Point = draggable((60.0, 0.0), low=-5000.0, high=5000.0, unit="m", role="station", group="more")
+    station_1: Point = draggable((0.0, 0.0), low=-500.0, high=500.0, unit="m", role="station", group="more")
+    station_2: Point = draggable((60.0, 0.0), low=-500.0, high=500.0, unit="m", role="station", group="more")
     samples: int = slider(20_000, low=1000, high=200_000, log=True, group="more")
     seed: int = seed(1, group="more")
 
@@ -114,6 +114,7 @@ def timeline(p: Params) -> Timeline:
 
 LESSON = Lesson(
     Params, compute, view, timeline=timeline, refs=("MAT 3.3.2", "MAT (3.16)", "MAT (3.17)", "MAT exercise 3.8"),
+    unused=lambda p: UNUSED[p.map],
     presets={
         "polar to Cartesian: 100 m, 90° ± 15°": {},
         "κ = 3 − n": {"kappa": 1.0, "sigma_2": 30.0},
@@ -123,8 +124,7 @@ LESSON = Lesson(
         "two ranges, gently curved": {"map": "two_ranges", "mean": (10.0, 100.0), "sigma_1": 8.0, "sigma_2": 12.0,
                                       "station_1": (-60.0, 0.0), "station_2": (60.0, 0.0)},
         "exercise 3.8: degree 4": {"map": "polynomial", "degree": 4, "mean": (100.0, 100.0), "sigma_1": 200.0,
-                                   "sigma_2": 200.0, **AWAY},
-        "squares at zero": {"map": "polynomial", "degree": 2, "mean": (0.0, 0.0), "sigma_1": 40.0, "sigma_2": 40.0,
-                            **AWAY},
+                                   "sigma_2": 200.0},
+        "squares at zero": {"map": "polynomial", "degree": 2, "mean": (0.0, 0.0), "sigma_1": 40.0, "sigma_2": 40.0},
     },
 )

@@ -1,6 +1,6 @@
 """A lesson: parameters, a slow pure `compute`, a fast pure `view`, and a timeline."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -96,7 +96,8 @@ class Lesson:
     """The mathematics of one lesson; its words lie beside it in Markdown.
 
     presets: name -> changed parameters; the keys "step" and "stage" may be among them.  timeline: None (a still
-    picture), or a function of the parameters.  budget_s: time that compute may take at the default.
+    picture), or a function of the parameters.  unused: names of the parameters that have no effect at the others'
+    values; their controls and handles are hidden.  budget_s: time that compute may take at the default.
     """
 
     Params: type
@@ -105,8 +106,13 @@ class Lesson:
     refs: tuple[str, ...] = ()
     presets: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     timeline: Callable[[Any], Timeline] | None = None
+    unused: Callable[[Any], Collection[str]] | None = None
     budget_s: float = 1.0
 
     def timeline_of(self, params: Any) -> Timeline:
         """The timeline at these parameters; a still picture has one step with one stage."""
         return self.timeline(params) if self.timeline else Timeline(0)
+
+    def unused_at(self, params: Any) -> Collection[str]:
+        """Names of the parameters without effect at these."""
+        return self.unused(params) if self.unused else ()

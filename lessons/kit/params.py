@@ -126,19 +126,19 @@ class Parameter:
             raise self._error(self.expected, text) from None
 
     def _number(self, value: object) -> float:
-        if isinstance(value, bool) or not isinstance(value, (int, float)) or not math.isfinite(value):
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not -math.inf < value < math.inf:
             raise self._error("a finite number", value)
         if not self.low <= value <= self.high:
             raise self._error(self.expected, value)
         return float(value)
 
     def _clip(self, value: object) -> float:
-        if not isinstance(value, (int, float)) or math.isnan(value):
+        if not isinstance(value, (int, float)) or value != value:
             raise self._error("a number", value)
         return min(max(value, self.low), self.high)
 
     def _error(self, expected: str, got: object) -> ValueError:
-        return ValueError(f"{self.name}: expected {expected}, got {got!r}")
+        return ValueError(f"{self.name}: expected {expected}, got {got!r:.60}")
 
 
 def slider(default: float | int, *, low: float, high: float, step: float | None = None, unit: str = "",

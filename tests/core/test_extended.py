@@ -6,8 +6,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from core import extended, kalman
-from core.motion import constant_velocity
-from core.sensors import Bearing, Linear, Range, Stack
+from core.metrics import consistency_band, nees
+from core.motion import constant_velocity, constant_velocity_with_clock
+from core.sensors import Bearing, Linear, Pseudorange, Range, Stack
 from core.types import Gaussian
 from tests.oracle import entry
 
@@ -151,6 +152,25 @@ def test_nonlinear_motion_written_without_any_help(runs):
     F = model.jacobian(x)
     np.testing.assert_allclose(g.mean, model.f(x), rtol=1e-13)
     np.testing.assert_allclose(g.cov, F @ P @ F.mT + model.Q, rtol=1e-12, atol=1e-15)
+
+
+def test_pseudoranges_with_a_clock_in_the_state():
+    """200 receivers, 20 epochs, satellites far enough to be nearly linear: final NEES in its 99.9 % band."""
+    rng = np.random.default_rng(6)
+    directions = np.array([[0, 0, 1], [1, 0, 0.5], [-0.5, 0.9, 0.4], [-0.5, -0.9, 0.6], [0.3, -0.4, 0.9]])
+    satellites = 2.2e7 * directions / np.linalg.norm(directions, axis=1, keepdims=True)
+    model, sensor = constant_velocity_with_clock(1.0, [1.0, 1.0, 0.2], 3, 0.5, 0.2), Pseudorange(satellites, 3.0)
+    start = Gaussian(np.zeros(8), np.diag([50.0**2] * 3 + [100.0**2] + [5.0**2] * 3 + [2.0**2]))
+    x = rng.normal(size=(200, 8)) * np.sqrt(start.cov.diagonal())
+    ys = np.empty((20, 200, 5))
+    for k in range(20):
+        x = model.sample(x, rng)
+        ys[k] = sensor.h(x) + 3.0 * rng.normal(size=(200, 5))
+    steps = extended.run(start, ys, model, sensor)
+    g = Gaussian(steps.posterior.mean[-1], steps.posterior.cov[-1])
+    low, high = consistency_band(0.999, 8, 200)
+    assert low < nees(g, x).mean() < high
+    assert np.sqrt(g.cov[:, 3, 3]).max() < 10
 
 
 def test_iterations_must_be_counted():

@@ -104,8 +104,8 @@ def test_cramer_rao_of_ranges_is_the_dop_covariance():
 def test_cramer_rao_with_a_prior_is_the_kalman_covariance():
     sensor = Stack([Range([[0.0, 0.0]], 3.0), Bearing([[0.0, 0.0]], 0.1)])
     x, P = np.array([30.0, 40.0, 1.0, 2.0]), np.diag([100.0, 50.0, 9.0, 0.0])
-    np.testing.assert_allclose(cramer_rao(sensor, x, P), kalman.update(Gaussian(x, P), sensor.h(x), sensor).posterior.cov,
-                               atol=1e-9)
+    step = kalman.update(Gaussian(x, P), sensor.h(x), sensor)
+    np.testing.assert_allclose(cramer_rao(sensor, x, P), step.posterior.cov, atol=1e-9)
 
 
 def test_no_unbiased_estimator_beats_the_bound():

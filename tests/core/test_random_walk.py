@@ -5,11 +5,42 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from core import grid
 from core import random_walk as rw
+from core.gaussian import log_density
 from core.metrics import rmse
+from core.types import Gaussian
 from tests.oracle import entry
 
 pytestmark = pytest.mark.filterwarnings("error")
+
+
+def test_t_01_bayes_theorem():
+    e = entry("T-01")
+    step = grid.multiply(grid.GridDensity(np.arange(3.0), e["inputs"]["prior"]), np.log(e["inputs"]["lik"]))
+    assert step.evidence == pytest.approx(e["expected"]["evidence"], abs=1e-12)
+    np.testing.assert_allclose(step.posterior.weights, e["expected"]["posterior"], atol=1e-12)
+
+
+def test_t_02_bayes_filter_in_a_corridor():
+    e = entry("T-02")
+    T, L = np.array(e["inputs"]["T"]), np.array(e["inputs"]["L"])
+    p = np.array(e["inputs"]["p0"])
+    for reading, want in zip(e["inputs"]["readings_1based"], e["expected"]["steps"], strict=True):
+        prior = p @ T                                                           # (2.11)
+        step = grid.multiply(grid.GridDensity(np.arange(3.0), prior), np.log(L[:, reading - 1]))
+        p = step.posterior.weights
+        np.testing.assert_allclose(prior, want["prior"], atol=1e-10)
+        np.testing.assert_allclose(p, want["posterior"], atol=1e-10)
+        assert step.evidence == pytest.approx(want["Z"], abs=1e-10)             # (2.12)
+
+
+def test_t_18_normaliser_of_the_normal_density():
+    e = entry("T-18")
+    g = Gaussian(np.zeros(2), np.array(e["inputs"]["Sigma"], dtype=float))
+    assert np.exp(log_density(g, g.mean)) == pytest.approx(e["expected"]["correct"], rel=1e-10)
+    printed = 1 / np.linalg.det(np.sqrt(2 * np.pi) * g.cov)                     # erratum K3
+    assert printed == pytest.approx(e["expected"]["printed"], rel=1e-10)
 
 
 def test_t_13_walk_with_given_increments():

@@ -255,6 +255,13 @@ def test_at_a_station_nothing_is_nan_and_the_row_is_zero(name):
             assert not J[..., 0, :].any()
 
 
+@pytest.mark.parametrize("name", ["range", "bearing", "rate", "signal"])
+def test_almost_at_a_station(name):
+    for distance in (1e-300, 1e-160, 1e-100, 1e-20):
+        x = np.array([distance, -distance, 1.0, 2.0])
+        assert np.isfinite(SMOOTH[name].h(x)).all() and np.isfinite(SMOOTH[name].jacobian(x)).all()
+
+
 # --- likelihoods -------------------------------------------------------------------------------------------------
 
 
@@ -332,6 +339,9 @@ def test_missing_access_points_are_left_out():
     heard = SignalStrength(STATIONS[[0, 2]], [-40.0, -45.0], [2.5, 3.0], [6.0, 5.0])
     np.testing.assert_allclose(SMOOTH["signal"].log_likelihood(y, x), heard.log_likelihood(y[[0, 2]], x), rtol=1e-13)
     assert not SMOOTH["signal"].log_likelihood(np.full(3, np.nan), x).any()
+    for bad in ([np.nan, np.inf, -60.0], [np.nan, -60.0]):
+        with pytest.raises(ValueError, match="y: expected"):
+            SMOOTH["signal"].log_likelihood(bad, x)
     f = STEPS["fingerprint"]
     one = Fingerprint(STATIONS, f.powers_dbm[:, :1], 4.0)
     np.testing.assert_allclose(f.log_likelihood([-60.0, np.nan], x), one.log_likelihood([-60.0], x), rtol=1e-13)

@@ -174,7 +174,7 @@ def test_both_ends_of_every_parameter_are_finite(name):
                     assert np.isfinite(np.asarray(trace.y, dtype=float)).all()
             for e in v.equations:
                 for piece in e.pieces:
-                    assert isinstance(piece, str) and typeset(piece) or np.isfinite(piece).all()
+                    assert (isinstance(piece, str) and typeset(piece)) or np.isfinite(piece).all()
 
 
 def test_stations_in_one_place_still_have_a_side():

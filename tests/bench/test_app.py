@@ -1,0 +1,261 @@
+"""The app between the mathematics and the browser: its reaction to a slider, and what its renderer costs.
+
+Every lesson is measured at its defaults.
+"""
+
+import contextlib
+import gc
+import time
+from collections.abc import Callable, Iterator
+from dataclasses import replace
+from statistics import median
+from typing import Any
+
+import numpy as np
+import pytest
+
+from app.draw.lower import DRAW, backdrop, lower
+from app.draw.primitives import Primitive, style_for
+from app.draw.space import space_for
+from app.scene_renderer import SceneRenderer
+from app.server import App
+from app.session import Session
+from app.theme import LIGHT
+from lessons.kit.lesson import View, no_progress
+from lessons.kit.params import Parameter
+from lessons.registry import Entry, Registry
+from tests.bench import at_most
+from tests.bench.wire import Frame, Wire
+
+pytestmark = pytest.mark.bench
+
+LESSONS = [entry.id for entry in Registry()]
+# The slider that is moved, where it is not the lesson's first plain one.
+SLIDERS = {"filtering.particle_vs_ekf": "sigma_m"}
+MOVES, ROUND_TRIPS, UPDATES, SWEEPS = 9, 25, 40, 3
+DATA = {"lines": "points", "points": "points", "arrows": "points", "mesh": "vertices"}
+LENGTHS = ("point_size", "shaft_radius", "head_radius", "head_length", "render_width", "render_height")
+
+
+@pytest.fixture(scope="module")
+def app() -> Iterator[App]:
+    app = App(Registry(), port=0)
+    yield app
+    app.stop()
+
+
+@contextlib.contextmanager
+def connected(app: App, lesson: str) -> Iterator[tuple[Wire, Session]]:
+    """A browser that draws nothing, with the lesson open."""
+    wire = Wire(app.port, f"?lesson={lesson}")
+    try:
+        session = app.wait_for_session(60.0)
+        assert session.wait_ready(60.0) and session.scenario.lesson == lesson, session.error
+        wire.everything_sent(session.client)
+        yield wire, session
+    finally:
+        wire.close()
+        _wait(lambda: not app.sessions)
+
+
+@pytest.mark.parametrize("lesson", LESSONS)
+def test_slider_to_last_scene_message(lesson: str, app: App) -> None:
+    """From the widget's message to the last change of the scene on the wire: at most 3 times the lesson's own time
+    and as many bare round trips of viser."""
+    wire, session = connected(lesson)
+    entry = app.registry[lesson]
+    slider, values = _slider(entry)
+    label = entry.words().label("params", slider.name)
+    uuid = next(m["uuid"] for frame in wire.frames(0) for m in frame.messages
+                if m["type"] == "GuiSliderMessage" and m["props"]["label"].startswith(label))
+    moment = session.scenario.moment
+    ours, own = [], []
+    for value in values:
+        # the lesson's own work, with nothing cached, directly before the same work inside the app
+        params = replace(entry.lesson.Params(), **{slider.name: value})
+        start = time.perf_counter()
+        entry.lesson.view(params, entry.lesson.compute(params, no_progress), moment)
+        own.append(time.perf_counter() - start)
+
+        since = wire.mark()
+        start = wire.set_widget(uuid, value)
+        _wait(lambda value=value: getattr(session.scenario.params, slider.name) == value)
+        assert session.wait_ready(60.0)
+        wire.everything_sent(session.client)
+        ours.append(_last_scene_message(wire.frames(since)) - start)
+    trip = _round_trip(wire, session)
+    at_most(f"{lesson}: slider to last scene message / its compute + view + a round trip of {1e3 * trip:.1f} ms",
+            1e3 * median(ours), 1e3 * (median(own) + trip), 3.0)
+
+
+@pytest.mark.parametrize("lesson", LESSONS)
+def test_renderer_against_hand_written_updates(lesson: str, app: App) -> None:
+    """Scrubbing: axes, lowering, placing and comparing cost at most half as much again as a program that builds the
+    same arrays for the same nodes and assigns only those that can change."""
+    wire, session = connected(lesson)
+    client = session.client
+    renderer, by_hand = SceneRenderer(client.scene), ByHand(client.scene)
+    ours, reference = [], []
+
+    def timed(show: Callable[[], None]) -> float:
+        start = time.perf_counter()
+        with client.atomic():
+            show()
+        client.flush()
+        spent = time.perf_counter() - start
+        wire.everything_sent(client)
+        return spent
+
+    def render(view: View) -> None:
+        renderer.render(space_for(view.camera).place(lower(view, style_for(view.camera, LIGHT))))
+
+    views = _scrubbed(app.registry[lesson])
+    gc.disable()
+    try:
+        for sweep in range(SWEEPS):
+            for view in views:
+                a, b = timed(lambda view=view: render(view)), timed(lambda view=view: by_hand.show(view))
+                if sweep > 0:  # the first adds most of the nodes
+                    ours.append(a)
+                    reference.append(b)
+    finally:
+        gc.enable()
+    assert set(renderer.names) == set(by_hand.nodes)
+    at_most(f"{lesson}: renderer / hand-written updates of its {len(by_hand.nodes)} nodes",
+            1e3 * median(ours), 1e3 * median(reference), 1.5)
+
+
+class ByHand:
+    """What a program for one lesson would do: add a node once, and later assign the data that changes with time.
+
+    It draws with the kit's own functions, as the arrays must be the same.
+    """
+
+    def __init__(self, scene: Any) -> None:
+        self._scene = scene
+        self.nodes: dict[str, Any] = {}
+
+    def show(self, view: View) -> None:
+        style, space = style_for(view.camera, LIGHT), space_for(view.camera)
+        origin, scale = np.array(space.origin), space.scale
+        first = not self.nodes
+        found: list[tuple[Primitive, float]] = []
+        if first:
+            found += [(p, 0.0) for p in backdrop(view.camera, style)]
+        for layer, item in enumerate(view.scene):
+            lift = 0.5 * layer * style.pixel if style.layered else 0.0
+            found += [(p, lift) for p in DRAW[type(item)](item, style)]
+        for p, lift in found:
+            self._update(p, lift, origin, scale)
+        if not first:
+            kept = {p.name for p, _ in found}
+            for name in [n for n in self.nodes if n not in kept and not n.startswith(("axes.", "ground"))]:
+                self.nodes.pop(name).remove()
+
+    def _update(self, p: Primitive, lift: float, origin: np.ndarray, scale: float) -> None:
+        node = self.nodes.get(p.name)
+        if p.kind in DATA:
+            data = ((p.props[DATA[p.kind]] - origin) * scale).astype(np.float32)
+            if node is not None and self._fits(node, p, data):
+                setattr(node, DATA[p.kind], data)
+                if p.kind == "arrows":
+                    for key in ("head_length", "head_radius"):
+                        if getattr(node, key) != p.props[key] * scale:
+                            setattr(node, key, p.props[key] * scale)
+                return
+            position = (0.0, 0.0, lift * scale)
+        else:
+            x, y, z = p.position
+            position = ((x - origin[0]) * scale, (y - origin[1]) * scale, (z + lift - origin[2]) * scale)
+            if node is not None:
+                key = "text" if p.kind == "label" else "image"
+                setattr(node, key, p.props[key])
+                node.position = position
+                return
+        if node is not None:
+            node.remove()
+        self.nodes[p.name] = self._add(p, position, origin, scale)
+
+    def _fits(self, node: Any, p: Primitive, data: np.ndarray) -> bool:
+        """Whether the node takes this many points; colours per point and faces come when a node is added."""
+        if p.kind == "mesh":
+            return len(node.vertices) == len(data)
+        if p.kind in ("points", "arrows") and p.props["colors"].ndim > 1:
+            return len(node.points) == len(data)
+        return True
+
+    def _add(self, p: Primitive, position: tuple[float, ...], origin: np.ndarray, scale: float) -> Any:
+        props = dict(p.props)
+        for key in LENGTHS:
+            if key in props:
+                props[key] = float(props[key] * scale)
+        for key in ("points", "vertices"):
+            if key in props:
+                props[key] = ((props[key] - origin) * scale).astype(np.float32)
+        add = {"lines": self._scene.add_line_segments, "points": self._scene.add_point_cloud,
+               "arrows": self._scene.add_arrows, "mesh": self._scene.add_mesh_simple, "label": self._scene.add_label,
+               "image": self._scene.add_image}[p.kind]
+        return add(f"/hand/{p.name}", position=position, **props)
+
+
+def _slider(entry: Entry) -> tuple[Parameter, list[float]]:
+    """A slider of the lesson, and places near its default to move it to."""
+    plain = (p for p in entry.parameters.values() if p.kind == "float" and not p.log)
+    slider = entry.parameters[SLIDERS[entry.id]] if entry.id in SLIDERS else next(plain)
+    step = slider.step or (slider.high - slider.low) / 200
+    sign = 1.0 if float(slider.default) + (MOVES + 1) * step <= slider.high else -1.0  # type: ignore[arg-type]
+    found = [slider.validate(round(float(slider.default) + sign * k * step, 9))  # type: ignore[arg-type]
+             for k in range(1, MOVES + 1)]
+    return slider, found  # type: ignore[return-value]
+
+
+def _scrubbed(entry: Entry) -> list[View]:
+    """The views along the timeline, or, where it has one step, along a slider; at most UPDATES."""
+    lesson, params = entry.lesson, entry.lesson.Params()
+    timeline = lesson.timeline_of(params)
+    if timeline.steps > 0:
+        result = lesson.compute(params, no_progress)
+        steps = np.unique(np.linspace(0, timeline.steps, UPDATES).astype(int))
+        return [lesson.view(params, result, timeline.clamp(int(k), -1)) for k in steps]
+    slider, values = _slider(entry)
+    moved = [replace(params, **{slider.name: value}) for value in values]
+    return [lesson.view(p, lesson.compute(p, no_progress), timeline.clamp(0, -1)) for p in moved] * 3
+
+
+def _round_trip(wire: Wire, session: Session) -> float:
+    """Seconds from a widget's message to the node that its callback moves, with viser alone."""
+    client = session.client
+    widget = client.gui.add_slider("bare", 0.0, 100.0, 1.0, 0.0)
+    node = client.scene.add_frame("/bare", show_axes=False)
+
+    async def moved(_: Any) -> None:
+        node.position = (0.0, 0.0, widget.value)
+        client.flush()
+
+    widget.on_update(moved)
+    wire.everything_sent(client)
+    uuid = next(m["uuid"] for frame in wire.frames(0) for m in frame.messages
+                if m["type"] == "GuiSliderMessage" and m["props"]["label"] == "bare")
+    spent = []
+    for k in range(1, ROUND_TRIPS + 1):
+        since = wire.mark()
+        start = wire.set_widget(uuid, float(k))
+        wire.wait_for("SetPositionMessage", since, name="/bare")
+        spent.append(_last_scene_message(wire.frames(since)) - start)
+        wire.everything_sent(client)
+    widget.remove()
+    node.remove()
+    return median(spent)
+
+
+def _last_scene_message(frames: list[Frame]) -> float:
+    """When the last message about a node of the scene came."""
+    return max(frame.at for frame in frames if any(str(m.get("name", "")).startswith("/") for m in frame.messages))
+
+
+def _wait(condition: Callable[[], bool], timeout: float = 60.0) -> None:
+    deadline = time.monotonic() + timeout
+    while not condition():
+        if time.monotonic() > deadline:
+            raise TimeoutError("the server did not take the slider's value")
+        time.sleep(0.001)
