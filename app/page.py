@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import viser
 
+from app.code_tab import functions_html, script_html
 from app.figure_renderer import FigureRenderer
 from app.picture import SIZES
 from app.scenario import Scenario
@@ -83,6 +84,9 @@ class Page:
             self._text = gui.add_html("")
         with panel.add_tab("Formulas", viser.Icon.MATH_FUNCTION):
             self._equations = gui.add_html("")
+        with panel.add_tab("Code", viser.Icon.CODE):
+            self._script = gui.add_html("")
+            self._functions = gui.add_html("")
         with panel.add_tab("Contents", viser.Icon.LIST):
             self._contents(registry)
         panel.dock_left()
@@ -183,6 +187,7 @@ class Page:
         for lesson_id, button in self._lesson_buttons.items():
             button.color = "blue" if lesson_id == entry.id else "gray"
         self._text.content = lesson_html(entry, words)
+        self._functions.content = functions_html(entry)
         self.figures.clear()
         if self._presets is not None:
             self._presets.remove()
@@ -210,6 +215,7 @@ class Page:
             with self._transport_folder:
                 self.transport.rebuild(timeline, entry.words(scenario.language))
         self.transport.show(scenario)
+        self._script.content = script_html(entry, scenario)
 
     def show_view(self, view: View, words: Words, legend: list[tuple[str, str]]) -> None:
         """The numbers and what lies over the scene."""

@@ -35,15 +35,16 @@ def lower(view: View, style: Style) -> list[Primitive]:
     """The primitives of a view, axes and grid included.
 
     In a plane view later items lie a hair above earlier ones, so that they cover them.  ValueError for two items
-    of one name.
+    of one name, or one with the name of another's part.
     """
     found = backdrop(view.camera, style)
-    seen: set[str] = set()
+    seen = {p.name for p in found}
     for layer, item in enumerate(view.scene):
-        if item.name in seen:
-            raise ValueError(f"two items of the scene are called {item.name!r}; names must differ")
-        seen.add(item.name)
         made = DRAW[type(item)](item, style)
+        names = {item.name, *(p.name for p in made)}
+        if taken := names & seen:
+            raise ValueError(f"two things in the scene are called {min(taken)!r}; names must differ")
+        seen |= names
         found += raised(made, 0.5 * layer * style.pixel) if style.layered else made
     return found
 

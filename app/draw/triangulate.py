@@ -8,7 +8,7 @@ from core.types import Array
 def triangulate(vertices: Array) -> Array:
     """Faces (n-2, 3), indices into the vertices (n, 2) of a simple polygon in either direction.
 
-    ValueError for fewer than three vertices or a polygon that crosses itself.
+    ValueError for fewer than three vertices.  The faces of a polygon that crosses itself overlap.
     """
     n = len(vertices)
     if n < 3:
@@ -35,6 +35,6 @@ def triangulate(vertices: Array) -> Array:
                 del left[at]
                 break
         else:
-            raise ValueError("expected a simple polygon, got one that crosses itself")
+            raise ValueError("expected a simple polygon, got one without ears")
     faces.append(tuple(left))
     return np.array(faces, dtype=np.uint32)

@@ -141,6 +141,21 @@
       hidden = ids;
       nameInputs();
     },
+    async copy(button) {
+      const text = button.parentElement.querySelector("pre").textContent;
+      try {
+        await navigator.clipboard.writeText(text);
+      } catch {
+        // pages that are not served from this machine may not use the clipboard directly
+        const area = Object.assign(document.createElement("textarea"), { value: text });
+        document.body.append(area);
+        area.select();
+        document.execCommand("copy");
+        area.remove();
+      }
+      button.textContent = "Copied";
+      setTimeout(() => { button.textContent = "Copy"; }, 1500);
+    },
     setTitle(title) { document.title = title; },
   };
 })();
