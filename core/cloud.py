@@ -49,11 +49,13 @@ def log_weights(w: Array) -> tuple[Array | float, float]:
 
     ValueError for a weight that is negative, infinite or NaN.
     """
-    low, high = float(w.min()), float(w.max())
+    low, high = (float(w[0]),) * 2 if w.strides == (0,) else (float(w.min()), float(w.max()))
     if not 0.0 <= low <= high < np.inf:
         raise ValueError(f"weights: expected finite numbers >= 0, got numbers from {low} to {high}")
+    if low == high:
+        return (math.log(low) if low else -np.inf), low * len(w)
     with np.errstate(divide="ignore"):
-        return (np.log(low), low * len(w)) if low == high else (np.log(w), float(w.sum()))
+        return np.log(w), float(w.sum())
 
 
 def weigh(log_factor: Array, before: Array | float, x: Array, w: Array) -> Piece:
@@ -63,14 +65,14 @@ def weigh(log_factor: Array, before: Array | float, x: Array, w: Array) -> Piece
     ValueError for NaN or +inf in log w, or NaN or infinity in x.
     """
     n = x.shape[-1]
-    one = np.ndim(before) == 0                            # then the shift cancels and only moves the peak
+    one = isinstance(before, float)                       # then the shift cancels and only moves the peak
     log_w = log_factor if one else log_factor + before
     best = int(log_w.argmax())                            # argmax stops at a NaN
     peak = float(log_w[best])
     if peak == -np.inf:
         w.fill(0.0)
         return Piece(peak, 0.0, 0.0, np.zeros(n), np.zeros(n), np.zeros((n, n)))
-    if not np.isfinite(peak):
+    if not math.isfinite(peak):
         raise ValueError(f"log weight of a particle: expected a number or -inf, got {peak} at x = {x[best]}")
     np.subtract(log_w, peak, out=w)
     np.exp(w, out=w)
@@ -79,7 +81,7 @@ def weigh(log_factor: Array, before: Array | float, x: Array, w: Array) -> Piece
     if not np.isfinite(second).all():
         raise ValueError("particles: expected finite states, got NaN or infinity after the motion model")
     squares = float(np.einsum("b,b", w, w))
-    return Piece(peak + float(before) if one else peak, float(w.sum()), squares, c, first, second)
+    return Piece(peak + before if one else peak, float(w.sum()), squares, c, first, second)
 
 
 def combine(pieces: Sequence[Piece]) -> Summary:

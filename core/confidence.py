@@ -54,7 +54,7 @@ def normal() -> Law:
 
 
 def laplace() -> Law:
-    """f(z) = exp(-sqrt 2 |z|) / sqrt 2: P(|z| >= lam) = exp(-sqrt 2 lam).  MAT exercise 2.15(a), there with sd sqrt 2."""
+    """f(z) = exp(-sqrt 2 |z|) / sqrt 2: P(|z| >= lam) = exp(-sqrt 2 lam).  MAT exercise 2.15(a) has sd sqrt 2."""
     root = np.sqrt(2.0)
     return Law(lambda lam: np.exp(-root * lam), lambda p: -np.log1p(-p) / root,
                lambda rng, size: rng.laplace(0.0, 1.0 / root, size))

@@ -49,7 +49,7 @@ def dop(J: ArrayLike, *, clock: bool | None = None) -> Dop:
     if not 1 <= dim <= 3:
         raise ValueError(f"J: expected 1 to 3 position columns and perhaps a clock column, got shape {J.shape}")
     if m < n:
-        raise ValueError(f"J: expected at least as many rows as columns (measurements as unknowns), got shape {J.shape}")
+        raise ValueError(f"J: expected at least as many rows (measurements) as columns (unknowns), got {J.shape}")
     G = _cofactors(J)
     variances = np.diagonal(G, axis1=-2, axis2=-1)
     pdop = _root(variances[..., :dim])
@@ -94,7 +94,7 @@ def position_covariance(J: ArrayLike, W: ArrayLike, Sigma: ArrayLike) -> Array:
     J = finite("J", J, None, None)
     m, n = J.shape[-2:]
     if m < n:
-        raise ValueError(f"J: expected at least as many rows as columns (measurements as unknowns), got shape {J.shape}")
+        raise ValueError(f"J: expected at least as many rows (measurements) as columns (unknowns), got {J.shape}")
     Lt = cholesky_psd(_matrix("W", W, m)).mT
     Sigma = _matrix("Sigma", Sigma, m)
     A = Lt @ J

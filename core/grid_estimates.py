@@ -61,22 +61,37 @@ def moments(p: GridDensity) -> Gaussian:
 def mode(p: GridDensity) -> Array:
     """argmax p(x), the maximum a posteriori estimate, (d,).
 
-    The best cell's centre, moved within the cell to the top of a parabola through the logarithms of its neighbours
-    (exact for a normal law with independent components).  With several equal tops the first.  MAT 3.4 (MAP).
+    The best cell's centre, moved to the top of the quadric through the logarithms of its neighbours (exact for a
+    normal law), or along each axis by a parabola where that quadric has no top nearby.  With several equal tops the
+    first.  MAT 3.4 (MAP).
 
     >>> mode(GridDensity([0.0, 1.0, 2.0], np.exp(-0.5 * np.square([-1.25, -0.25, 0.75])))).round(9).tolist()
     [1.25]
     """
     logs = p.log_weights
-    index = np.unravel_index(logs.argmax(), logs.shape)
-    x = np.array([a[i] for a, i in zip(p.axes, index, strict=True)])
-    for axis, (i, h) in enumerate(zip(index, p.spacing, strict=True)):
-        if 0 < i < logs.shape[axis] - 1:
-            line = logs[(*index[:axis], slice(i - 1, i + 2), *index[axis + 1:])]
-            left, top, right = line
-            bend = 2.0 * top - left - right
-            if np.isfinite(bend) and bend > 0.0:
-                x[axis] += 0.5 * h * (right - left) / bend
+    index = np.array(np.unravel_index(logs.argmax(), logs.shape))
+    x, steps = np.array([a[i] for a, i in zip(p.axes, index, strict=True)]), np.eye(p.dim, dtype=int)
+    inner = [i for i in range(p.dim) if 0 < index[i] < logs.shape[i] - 1]
+
+    def at(*moves: Array) -> float:
+        return logs[tuple(index + sum(moves))] - logs[tuple(index)]
+
+    if not np.isfinite([at(s * steps[i]) for i in inner for s in (-1, 1)]).all():
+        return x
+    slope = np.array([0.5 * (at(steps[i]) - at(-steps[i])) for i in inner])
+    bend = np.array([-at(steps[i]) - at(-steps[i]) for i in inner])
+    moved = np.where(bend > 0.0, slope / np.where(bend > 0.0, bend, 1.0), 0.0)
+    if len(inner) > 1:
+        H = np.diag(bend)
+        with np.errstate(invalid="ignore"):
+            for a, i in enumerate(inner):
+                for b, j in enumerate(inner[:a]):
+                    corners = [s * at(steps[i], s * steps[j]) + s * at(-steps[i], -s * steps[j]) for s in (1, -1)]
+                    H[a, b] = H[b, a] = -0.25 * sum(corners)
+        if np.isfinite(H).all() and np.linalg.eigvalsh(H).min() > 1e-9 * np.abs(H).max():
+            full = np.linalg.solve(H, slope)
+            moved = full if np.abs(full).max() <= 2.0 else moved
+    x[inner] += p.spacing[inner] * moved
     return x
 
 

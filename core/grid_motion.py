@@ -99,7 +99,7 @@ def blur(p: GridDensity, Q: ArrayLike) -> GridDensity:
     margin = np.ceil(_REACH * np.sqrt(np.maximum(np.diagonal(Q), 0.0)) / h).astype(int)
     for group in _groups(Q):
         shape = [w.shape[i] + 2 * margin[i] for i in group]
-        w = _convolve(w, group, shape, margin, (h[group, None] * h[group])**-1 * Q[np.ix_(group, group)])
+        w = _convolve(w, group, shape, margin, Q[np.ix_(group, group)] / (h[group, None] * h[group]))
     axes = [_longer(a, k, k) for a, k in zip(p.axes, margin, strict=True)]
     return GridDensity(axes, np.maximum(w, 0.0))
 
@@ -196,16 +196,13 @@ def _convolve(w: Array, group: list[int], shape: list[int], margin: Array, Q: Ar
 
     lengths = tuple(next_fast_len(n, real=True) for n in shape)
     kernel = _kernel(lengths, Q.tobytes())
-    extra = [len_ for len_ in w.shape]
-    for i, n in zip(group, lengths, strict=True):
-        extra[i] = n
-    spectrum = rfftn(w, lengths, axes=group)
     spread = [1] * w.ndim
     for i, n in zip(group, kernel.shape, strict=True):
         spread[i] = n
+    spectrum = rfftn(w, lengths, axes=group)
     spectrum *= kernel.reshape(spread)
     out = irfftn(spectrum, lengths, axes=group)
-    for i, n in zip(group, shape, strict=True):           # the margins are at the end: half belongs to the front
+    for i, n in zip(group, shape, strict=True):           # what spreads to the left comes out at the far end
         out = np.take(out, np.arange(-margin[i], n - margin[i]) % out.shape[i], axis=i)
     return out
 

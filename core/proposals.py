@@ -110,9 +110,9 @@ def _extended(y: Array, fx: Array, L: Array, sensor: Sensor) -> LocalModel:
 
 
 def _unscented(y: Array, fx: Array, L: Array, sensor: Sensor) -> LocalModel:
-    """y = y_bar + P_ye e + v, V(v) = R + what is left: the line through the sigma points of e ~ N(0, I).  (3.15), (3.17)
+    """y = y_bar + P_ye e + v, V(v) = R + what is left: the line through the sigma points of e ~ N(0, I).
 
-    kappa = max(3 - r, 0), so that no weight is negative.
+    MAT (3.15) and (3.17) with kappa = max(3 - r, 0), so that no weight is negative.
     """
     r = L.shape[1]
     kappa = max(3 - r, 0)

@@ -46,7 +46,7 @@ def systematic(w: ArrayLike, u: float, *, threads: int | None = None) -> Indices
 
 
 def comb(
-    w: Array, u: float, threads: int | None = None, then: Callable[[slice, Indices], None] = lambda rows, ancestors: None
+    w: Array, u: float, threads: int | None = None, then: Callable[[slice, Indices], None] | None = None
 ) -> Indices:
     """`systematic` for weights (N,) that are known to be finite, >= 0 and of sum 1.
 
@@ -55,24 +55,31 @@ def comb(
     >>> comb(np.array([0.25, 0.75]), 0.5).tolist()
     [0, 1]
     """
-    C, s = _cumulative(w, threads)
-    N = len(C)
+    N, blocks = len(w), spans(len(w), LONG)
+    s, one = _unit(N)
+    C = np.empty(N, np.int64)                             # sums within each block: block k has ends[k-1] before it
+    ends = list(accumulate(for_each(lambda block: _sums(w[block], one, C[block]), blocks, threads)))
     first = math.ceil(u * 2**s)                           # points first + i 2^s: those <= C_j are counted, not searched
+    last = ends.index(ends[-1])                           # the block where the weights end
     ancestors = np.empty(N, np.intp)
 
-    def fill(block: slice) -> None:
-        start = (int(C[block.start - 1]) - first + (1 << s)) >> s if block.start else 0
-        K = C[block] - (first - (1 << s) + (start << s))
+    def fill(k: int) -> None:
+        before = ends[k - 1] if k else 0
+        start = (before - first + (1 << s)) >> s if k else 0
+        K = C[blocks[k]] + (before - first + (1 << s) - (start << s))
         K >>= s                                           # K_j = number of points z <= c_j, from `start` on
-        count = int(K[-1])
-        if count:
+        if k == last:
+            K[np.searchsorted(C[blocks[k]], C[blocks[k].stop - 1]):] = N - start       # c_N = 1
+        count = min(int(K[-1]), N - start)
+        if count > 0:
             rows = slice(start, start + count)
             steps = np.bincount(K, minlength=count)[:count]                  # where the ancestor moves on
-            steps[0] += block.start
+            steps[0] += blocks[k].start
             np.cumsum(steps, out=ancestors[rows])
-            then(rows, ancestors[rows])
+            if then:
+                then(rows, ancestors[rows])
 
-    for_each(fill, spans(N, LONG), threads)
+    for_each(fill, range(last + 1), threads)
     return ancestors
 
 
@@ -191,27 +198,24 @@ def _points(name: str, u: ArrayLike, *shape: int | None) -> Array:
     return u
 
 
-def _cumulative(w: Array, threads: int | None = None) -> tuple[NDArray[np.int64], int]:
-    """C_j = c_j N 2^s as whole numbers (N,), C_N = N 2^s; and s."""
-    N = len(w)
+def _unit(N: int) -> tuple[int, int]:
+    """s and the whole number N 2^s that stands for 1."""
     s = _BITS - (N - 1).bit_length()
-    one = N << s
-    C = np.empty(N, np.int64)
-    blocks = spans(N, LONG)
+    return s, N << s
 
-    def local(block: slice) -> int:
-        shares = w[block] * float(one)
-        C[block] = np.rint(shares, out=shares)
-        np.cumsum(C[block], out=C[block])
-        return int(C[block.stop - 1])
 
-    ends = list(accumulate(for_each(local, blocks, threads)))
+def _sums(w: Array, one: int, out: NDArray[np.int64]) -> int:
+    """out_j = w_1 + ... + w_j in units of 1 / one; and the last of them."""
+    shares = w * float(one)
+    out[:] = np.rint(shares, out=shares)
+    np.cumsum(out, out=out)
+    return int(out[-1])
 
-    def shift(k: int) -> None:
-        C[blocks[k]] += ends[k - 1]
 
-    for_each(shift, range(1, len(blocks)), threads)
-    if ends[-1] > one:                                    # the weights' sum was a round-off above 1
-        np.minimum(C, one, out=C)
-    C[np.searchsorted(C, C[-1]):] = one
+def _cumulative(w: Array) -> tuple[NDArray[np.int64], int]:
+    """C_j = c_j N 2^s as whole numbers (N,), C_N = N 2^s; and s."""
+    s, one = _unit(len(w))
+    C = np.empty(len(w), np.int64)
+    total = _sums(w, one, C)
+    C[np.searchsorted(C, min(total, one)):] = one          # from the last particle with a weight on; round-off above 1
     return C, s

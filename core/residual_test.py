@@ -1,7 +1,8 @@
 """Finding measurements that are garbage from the residuals.  MAT 2.3.2 note 1.
 
 p = h(x) - y at the weighted least-squares solution x.  With only as many measurements as unknowns p vanishes and
-nothing can be found; with one more garbage can be noticed, with two more (in general) also located.  `core.robust` has an estimate that garbage hardly moves.
+nothing can be found; with one more garbage can be noticed, with two more (in general) also located.  `core.robust` has
+an estimate that garbage hardly moves.
 """
 
 from dataclasses import dataclass, field

@@ -56,7 +56,7 @@ def predict(posterior: Gaussian, motion: Motion, kappa: float, root: Root = "cho
     posterior = law("posterior", posterior)
     check_sizes(posterior.mean.shape[-1], motion, 0, None)
     sigma_weights(posterior.mean.shape[-1], kappa)
-    return _advance(posterior, motion, kappa, root)[0]
+    return advance(posterior, motion, kappa, root)[0]
 
 
 def update(
@@ -84,7 +84,7 @@ def update(
         if points.shape[-2:] != (2 * n + 1, n) or not is_finite(points):
             raise ValueError(f"points: expected finite numbers of shape (..., {2 * n + 1}, {n}), got {points.shape}")
         return _reuse(prior, y, sensor, kappa, points, None)
-    return _measure(prior, y, sensor, kappa, root, None)
+    return measure(prior, y, sensor, kappa, root, None)
 
 
 def run(
@@ -107,9 +107,9 @@ def run(
     sigma_weights(job.initial.mean.shape[-1], kappa)
     posterior, record = job.initial, Recorder(len(job.epochs), job.batch)
     for epoch in job.epochs:
-        prior, images = _advance(posterior, epoch.motion, kappa, root)
+        prior, images = advance(posterior, epoch.motion, kappa, root)
         if redraw:
-            step = _measure(prior, epoch.y, epoch.sensor, kappa, root, epoch.missing)
+            step = measure(prior, epoch.y, epoch.sensor, kappa, root, epoch.missing)
         else:
             step = _reuse(prior, epoch.y, epoch.sensor, kappa, images, epoch.missing)
         record.add(step)
@@ -117,16 +117,18 @@ def run(
     return record.result()
 
 
-def _advance(posterior: Gaussian, motion: Motion, kappa: float, root: Root) -> tuple[Gaussian, Array]:
+def advance(posterior: Gaussian, motion: Motion, kappa: float, root: Root) -> tuple[Gaussian, Array]:
+    """`predict` of a law that has been checked, and the images of its sigma points."""
     x, P = posterior
     parts = split(motion.f, x, root_of(P, root), kappa, np.subtract)
     P_prior, _ = safe(symmetric(times(parts.G, parts.G.mT) + parts.M) + motion.Q, parts.b, kappa)
     return Law(parts.mean, P_prior), parts.images
 
 
-def _measure(
+def measure(
     prior: Gaussian, y: Array, sensor: Sensor, kappa: float, root: Root, missing: Array | None
 ) -> UnscentedUpdate:
+    """`update` of a law that has been checked, without the entries of y that are `missing` (m,) or (..., m)."""
     x, P = prior
     parts = split(sensor.h, x, root_of(P, root), kappa, sensor.innovation)
     L, G = parts.L, parts.G

@@ -168,15 +168,16 @@ def _forget(connection: Any) -> None:
 
 
 def _checked_update(client: viser.ClientHandle) -> Callable[..., Any]:
-    """A widget update that sets `value` only, to something finite of the type it has."""
+    """A widget update that sets `value` only, to something finite of the type it has, or one of its options."""
     inner = client.gui._handle_gui_updates
 
     async def handle(client_id: int, message: messages.GuiUpdateMessage) -> None:
         widget = client.gui._gui_input_handle_from_uuid.get(message.uuid)
-        if widget is None or set(message.updates) != {"value"}:
+        if widget is None or not isinstance(message.updates, dict) or set(message.updates) != {"value"}:
             return
-        if not acceptable(widget._impl.value, message.updates["value"]):
-            log.warning("client %s: ignored the value %.80r of a widget", client_id, message.updates["value"])
+        value, options = message.updates["value"], getattr(widget._impl.props, "options", None)
+        if not acceptable(widget._impl.value, value) or options is not None and value not in options:
+            log.warning("client %s: ignored the value %.80r of a widget", client_id, value)
             return
         await inner(client_id, message)
 

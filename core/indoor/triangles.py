@@ -55,7 +55,6 @@ def _ear(ring: Array) -> int:
             break
         p, q, r = a[k], b[k], c[k]
         rest = np.delete(ring, [k - 1, k, (k + 1) % len(ring)], axis=0)
-        rest = rest[~((rest == p) | (rest == r)).all(axis=1)]
         inside = (_cross(q - p, rest - p) >= 0) & (_cross(r - q, rest - q) >= 0) & (_cross(p - r, rest - r) >= 0)
         if not inside.any():
             return int(k)

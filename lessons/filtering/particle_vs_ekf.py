@@ -170,7 +170,7 @@ LESSON = Lesson(
         "Example 22": {},
         "third base station": {"third_station": True, "zoom": "stations"},
         "SIS: no resampling": {"sampling": "sis"},
-        "few particles": {"n_particles": 100},
+        "few particles": {"n_particles": 110},
         "a million particles": {"n_particles": 1_000_000},
     },
 )

@@ -9,9 +9,12 @@ import pytest
 
 from app.server import App
 from app.session import Session
+from app.web import adapter
 from lessons.registry import Registry
 from tests.app import sample_lessons
-from tests.app.fake_browser import FakeBrowser
+from tests.app.fake_browser import FakeBrowser, Message
+
+MARK = "heardSoFar"
 
 
 def until(true: Callable[[], Any], timeout: float = 20.0) -> Any:
@@ -31,11 +34,25 @@ class Visit:
         self.browser = FakeBrowser(app.port, query, size)
         number = until(lambda: set(app.sessions) - before).pop()
         self.session: Session = app.sessions[number]
+        self._marks = 0
 
     def settle(self, timeout: float = 20.0) -> "Visit":
-        """Wait until the scenario has been computed and sent."""
+        """Wait until the scenario has been computed and the browser has got all of it."""
         until(lambda: self.session.wait_ready(0.5), timeout)
+        return self.hear(timeout)
+
+    def hear(self, timeout: float = 20.0) -> "Visit":
+        """Wait until the browser has got everything that was sent so far."""
+        self._marks += 1
+        adapter.call_page(self.session.client, MARK, self._marks)
+        self.session.client.flush()
+        self.browser.wait(lambda b: b.scripts(MARK)[-1:] == [str(self._marks)], timeout)
         return self
+
+    def heard(self) -> list[Message]:
+        """Everything that the browser has got, without our own marks."""
+        self.hear()
+        return [m for m in self.browser.received if not (m["type"] == "RunJavascriptMessage" and MARK in m["source"])]
 
 
 @pytest.fixture(scope="session")
@@ -66,5 +83,6 @@ def visit(app: App) -> Iterator[Callable[..., Visit]]:
 
     yield go
     for one in opened:
+        one.session.wait_ready(5.0)
         one.browser.close()
     until(lambda: not app.sessions)

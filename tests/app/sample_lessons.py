@@ -35,7 +35,8 @@ def view(p, wave, at):
     chart = figures.chart(figures.line("height", wave[:, 0], wave[:, 1], "truth"))
     return View(items, scene.Plane((-1.0, 7.0), (-10.0, 10.0)), {"height": chart},
                 [Readout("height", float(wave[at.step, 1]), "m")],
-                [Equation("height", (r"y = a \\sin x =", wave[at.step]), current=at.stage == 1)], caption=f"k = {at.step}")
+                [Equation("height", (r"y = a \\sin x =", wave[at.step]), current=at.stage == 1)],
+                caption=f"k = {at.step}")
 
 LESSON = Lesson(Params, compute, view, refs=("Test 1",), timeline=lambda p: Timeline(p.last, ("look", "see"), start=2),
                 presets={"high": {"amplitude": 9.0}, "early look": {"order": 5, "step": 1, "stage": "look"}})

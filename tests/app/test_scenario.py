@@ -173,7 +173,7 @@ def test_presets_start_from_the_defaults(quick):
     high = scenarios.with_preset(messy, quick, "high")
     assert (high.params.amplitude, high.params.seed, high.moment, high.theme) == (9.0, 7, Moment(2, 1), "dark")
     assert scenarios.with_preset(messy, quick, "early look").moment == Moment(1, 0)
-    with pytest.raises(ValueError, match="preset.*high.*early look.*nothing"):
+    with pytest.raises(ValueError, match=r"preset.*high.*early look.*nothing"):
         scenarios.with_preset(messy, quick, "nothing")
 
 

@@ -89,7 +89,8 @@ def lines(n: int = 2, z: float = 0.0) -> Primitive:
 
 
 def label(text: str = "x", name: str = "a") -> Primitive:
-    return Primitive(name, "label", {"text": text, "font_screen_scale": 1.2, "anchor": "center-center"}, (1.0, 2.0, 3.0))
+    props = {"text": text, "font_screen_scale": 1.2, "anchor": "center-center"}
+    return Primitive(name, "label", props, (1.0, 2.0, 3.0))
 
 
 def everything(camera: scene.Camera, theme: Any = LIGHT) -> list[Primitive]:

@@ -13,16 +13,17 @@ from tests.bench.report import record
 def medians(rounds: int, *, batch: int = 1, **calls: Callable[[], object]) -> dict[str, float]:
     """Median time of each call in milliseconds.
 
-    In every round each call runs `batch` times after one run that is not counted, and after a pause: the threads of
-    BLAS spin for some 30 ms after their last product, on a core that the next call would need.
+    In every round each call runs `batch` times after a pause and two runs that are not counted: the threads of BLAS
+    spin for some 30 ms after their last product, on a core that the next call would need, and a pause cools memory.
     """
     times: dict[str, list[float]] = {name: [] for name in calls}
     gc.disable()
     try:
         for _ in range(rounds):
             for name, call in calls.items():
-                call()
                 time.sleep(0.1)
+                call()
+                call()
                 for _ in range(batch):
                     start = time.perf_counter()
                     result = call()

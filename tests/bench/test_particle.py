@@ -1,6 +1,5 @@
 """The SIR step of MAT Example 22 against drawing its noise, the package `particles`, and FilterPy's way."""
 
-import os
 import tracemalloc
 from concurrent.futures import ThreadPoolExecutor
 
@@ -29,15 +28,16 @@ def cloud(N):
     return np.asfortranarray(INITIAL.mean + np.sqrt(np.diag(INITIAL.cov)) * z), np.full(N, 1.0 / N)
 
 
-def ours(N, threads=None):
+def ours(N):
     x, w = cloud(N)
     rng = np.random.default_rng(2)
-    return lambda: particle.step(x, w, Y, MOTION, SENSOR, rng, threads=threads)
+    return lambda: particle.step(x, w, Y, MOTION, SENSOR, rng)
 
 
 def the_package_particles(N):
+    """Its bootstrap filter with mean and variance collected at every step, which `step` computes as well."""
     smc = pytest.importorskip("particles")
-    from particles import distributions, state_space_models
+    from particles import collectors, distributions, state_space_models
 
     Phi, Q = np.array(MOTION.Phi), np.array(MOTION.Q)
 
@@ -54,7 +54,7 @@ def the_package_particles(N):
 
     def fresh():
         model = state_space_models.Bootstrap(ssm=Example22(), data=[Y[None]] * 1000)
-        algorithm = smc.SMC(fk=model, N=N, resampling="systematic", ESSrmin=1.0, collect="off")
+        algorithm = smc.SMC(fk=model, N=N, resampling="systematic", ESSrmin=1.0, collect=[collectors.Moments()])
         next(algorithm)
         next(algorithm)                                       # the first step draws the prior, without a resampling
         return algorithm
@@ -109,13 +109,6 @@ def test_step_against_particles(N, target, batch):
 def test_step_against_filterpy(N, target, batch):
     t = medians(3, batch=batch, ours=ours(N), reference=filterpy_style(N))
     faster(f"SIR step, N = {N:,} / FilterPy style", t["ours"], t["reference"], target)
-
-
-def test_two_threads_against_one():
-    if len(os.sched_getaffinity(0)) < 2:
-        pytest.skip("needs two cores")
-    t = medians(4, batch=7, two=ours(LARGE, 2), one=ours(LARGE, 1))
-    at_most("SIR step, N = 1e6: two threads / one", t["two"], t["one"], 0.85)
 
 
 def test_run_of_41_steps_against_noise_per_step():

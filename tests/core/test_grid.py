@@ -296,6 +296,17 @@ def test_sums_match_a_loop_over_cells_and_inputs_stay(seed, d):
         p.weights[(0,) * d] = 1.0
 
 
+@pytest.mark.parametrize("d", [1, 2, 3])
+def test_mode_of_a_normal_law_is_exact(d):
+    rng = np.random.default_rng(d)
+    B = rng.normal(size=(d, d))
+    g = Gaussian(rng.normal(size=d), B @ B.T + 0.3 * np.eye(d))
+    p = grid.from_gaussian(g, grid.gaussian_axes(Gaussian(g.mean + 0.1, g.cov), 21))
+    np.testing.assert_allclose(grid.mode(p), g.mean, atol=1e-9)
+    edge = GridDensity(cells(0.0, 1.0, 4), [4.0, 3.0, 2.0, 1.0])
+    assert float(grid.mode(edge)[0]) == 0.125
+
+
 def test_quantiles_and_marginals():
     p = GridDensity([cells(0.0, 4.0, 4), cells(0.0, 2.0, 2)], [[1, 1], [0, 0], [0, 0], [1, 1]])
     np.testing.assert_allclose(grid.quantile(p, [0.0, 0.25, 0.5, 0.75, 1.0]), [0.0, 0.5, 1.0, 3.5, 4.0])

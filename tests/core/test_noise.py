@@ -121,3 +121,8 @@ def test_for_each_keeps_order_and_passes_errors_on():
     with pytest.raises(ValueError, match="threads"):
         for_each(abs, [1], 0)
     assert blocks._cores() >= 1
+
+
+def test_for_each_may_be_nested():
+    inner = lambda i: sum(for_each(lambda j: i * j, range(20), threads=2))  # noqa: E731
+    assert for_each(inner, range(20), threads=2) == [190 * i for i in range(20)]

@@ -130,7 +130,7 @@ def test_on_a_linear_measurement_the_gaussian_proposals_are_the_optimal_one():
 
 def test_a_peaked_likelihood_wastes_the_particles_of_the_prior_proposal():
     x = np.tile(EXAMPLE_22.mean, (2000, 1))
-    y = RANGES.h(CV.f(x[0]) + [0.3, 0.4, 0.0, 0.0])
+    y = RANGES.h(CV.f(x[0]) + np.array([0.3, 0.4, 0.0, 0.0]))
     sharp = Range(STATIONS, 0.05)
     n_eff = {p: step(x, np.full(2000, 1 / 2000), y, CV, sharp, np.random.default_rng(1), proposal=p).n_eff
              for p in ("prior", "ekf", "ukf")}
@@ -388,7 +388,8 @@ def test_inputs_are_not_modified():
     (dict(weights=np.array([0.5, 0.5, np.nan, 0.5, 1.0])), "weights"),
     (dict(weights=np.full(5, np.inf)), "weights"),
     (dict(weights=np.zeros(5)), "weight"),
-    (dict(y=[1.0]), "y: expected shape"), (dict(y=[1.0, np.nan]), "y: expected finite"), (dict(y=np.ones((1, 2))), "y:"),
+    (dict(y=[1.0]), "y: expected shape"), (dict(y=[1.0, np.nan]), "y: expected finite"),
+    (dict(y=np.ones((1, 2))), "y: expected one"),
     (dict(resampler="best"), "resampler: expected one of systematic"),
     (dict(proposal="best"), "proposal: expected prior, ekf, ukf, optimal"),
     (dict(proposal="optimal"), "linear in the state"),
