@@ -1,6 +1,6 @@
 """Points that the user drags in the scene: the ray under the pointer meets the point's plane or sphere."""
 
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from typing import Any
 
 import numpy as np
@@ -44,9 +44,13 @@ def target(kind: str, start: Array, origin: Array, through: Array) -> Array | No
 class Handles:
     """One ball for each draggable point of a lesson; its drags become changes of the scenario."""
 
-    def __init__(self, client: Any, parameters: Mapping[str, Parameter], change: Change) -> None:
+    def __init__(self, client: Any, parameters: Mapping[str, Parameter], change: Change,
+                 released: Callable[[], None] = lambda: None) -> None:
+        """released: called when the user lets a ball go."""
         self._client = client
         self._change = change
+        self._released = released
+        self.dragging = False
         self._parameters = {name: p for name, p in parameters.items() if p.kind == "point"}
         self._balls: dict[str, Any] = {}
         self._drawn: dict[str, tuple[Any, ...]] = {}
@@ -61,7 +65,8 @@ class Handles:
                 continue
             x, y, z = space.display(_in_space(current[name], style))
             at = (float(x), float(y), float(z))
-            color, radius = style.theme.color(parameter.role), RADIUS * style.pixel * space.scale
+            # rounded, as a ball that is made anew for a rounding error would be lost from under the pointer
+            color, radius = style.theme.color(parameter.role), round(RADIUS * style.pixel * space.scale, 9)
             if self._drawn.get(name) != (color, radius):
                 self._discard(name)
                 ball = self._client.scene.add_icosphere(f"/handle.{name}", radius, color, subdivisions=2,
@@ -89,6 +94,12 @@ class Handles:
         digits = _digits(parameter)
 
         async def dragged(event: Any) -> None:
+            self.dragging = event.phase != "end"
+            move(event)
+            if not self.dragging:
+                self._released()
+
+        def move(event: Any) -> None:
             eye, through = (np.asarray(v, dtype=np.float64) for v in (self._client.camera.position, event.end_position))
             if through.shape != (3,) or not np.isfinite([eye, through]).all():
                 return
@@ -97,7 +108,7 @@ class Handles:
             if found is None:
                 return
             n = len(parameter.default)  # type: ignore[arg-type]
-            point = tuple(round(float(v), digits) for v in found[:n])
+            point = tuple(round(float(v), digits) + 0.0 for v in found[:n])  # no minus zero
             self._change({parameter.name: parameter.nearest(point)})
 
         ball.on_drag("left")(dragged)

@@ -31,6 +31,7 @@ from lessons.registry import Entry, Registry
 log = logging.getLogger(__name__)
 
 PROGRESS_SECONDS = 0.1
+MAX_NOTES = 6  # about the address
 
 
 class Session:
@@ -60,11 +61,13 @@ class Session:
     # -- changes ------------------------------------------------------------------------------------------------
 
     def update(self, change: Callable[[Scenario], Scenario]) -> None:
-        """Replace the scenario by change(scenario), and show it; ValueError leaves it as it was and tells the user."""
+        """Replace the scenario by change(scenario), and show it; an error leaves it as it was and tells the user."""
         with self._lock:
             try:
                 new = change(self.scenario)
-            except ValueError as error:
+            except Exception as error:
+                if not isinstance(error, ValueError):  # a lesson that cannot be imported
+                    log.exception("cannot change the scenario")
                 self.notify("This cannot be", str(error))
                 return
             if new == self.scenario:
@@ -144,12 +147,18 @@ class Session:
     def _open(self) -> None:
         """First work for a new browser: read its address, build the page, show what it asks for."""
         query = adapter.ask_page(self.client, "window.paikka.search", 10.0)
-        wanted, problems = scenarios.from_query(query, self._registry, self.scenario.lesson)
+        try:
+            wanted, problems = scenarios.from_query(query, self._registry, self.scenario.lesson)
+        except Exception as error:  # a lesson that cannot be imported
+            log.exception("cannot open %.80r", query)
+            wanted, problems = self.scenario, [f"It asks for a lesson that cannot be opened: {error}"]
         with self._lock:
             self.scenario = wanted
         light_scene(self.client.scene)
         self._page = Page(self, self._registry)
         self.client.camera.on_update(self._camera_moved)
+        if len(problems) > MAX_NOTES:
+            problems[MAX_NOTES - 1:] = [f"There are {len(problems) - MAX_NOTES + 1} more mistakes."]
         for problem in problems:
             self.notify("The address is not quite right", problem)
         self._worker.submit(wanted)
@@ -167,6 +176,9 @@ class Session:
         result = self._cache.get(wanted.compute_key, lambda p: entry.lesson.compute(wanted.params, p),
                                  self._progress(wanted))
         view = entry.lesson.view(wanted.params, result, wanted.moment)
+        if self.view is not None and self._handles is not None and self._handles.dragging:
+            # the picture stands still under the pointer, and is fitted again when the handle is let go
+            view = replace(view, camera=self.view.camera)
         with self.render_lock, self.client.atomic():
             self.error = ""
             self.draw(view, words, wanted)
@@ -236,7 +248,8 @@ class Session:
         page.open_lesson(entry, words, wanted)
         with page.controls_folder:
             self._controls = Controls(self.client.gui, entry.parameters, words, wanted.params, self.change_params)
-        self._handles = Handles(self.client, entry.parameters, self.change_params)
+        self._handles = Handles(self.client, entry.parameters, self.change_params,
+                                lambda: self._worker.submit(self.scenario))
         self._built = entry.id
         adapter.call_page(self.client, "setTitle", f"{words.title} \u00b7 Paikka")
 

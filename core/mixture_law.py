@@ -8,8 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from core import checks, gaussian
-from core.stacks import Law, is_finite, symmetric, times
+from core.stacks import Law, cholesky, solve_spd, symmetric, times
 from core.types import Array, Gaussian
+
+_LOG_2PI = float(np.log(2.0 * np.pi))
 
 
 class Mixture(NamedTuple):
@@ -179,12 +181,45 @@ def mode(m: Mixture) -> Array:
     return np.take_along_axis(x, best[..., None, None], axis=-2)[..., 0, :]
 
 
+def log_evidence(nu: Array, S: Array) -> Array:
+    """log N(nu; 0, S) = -(m log 2 pi + log det S + nu' S^-1 nu) / 2.
+
+    nu (..., m), S (..., m, m) positive definite -> (...).  Entries NaN (not measured) are left out, and m counts the
+    others.
+
+    >>> float(log_evidence(np.array([3.0, np.nan]), np.eye(2)).round(6))
+    -5.418939
+    """
+    missing = np.isnan(nu)
+    if missing.any():
+        apart = missing[..., :, None] | missing[..., None, :]
+        S, nu = np.where(apart, np.eye(nu.shape[-1]), S), np.where(missing, 0.0, nu)
+    L = cholesky(S)
+    if L is None:
+        raise ValueError("S: expected a positive definite innovation covariance, got a singular one")
+    log_det = 2.0 * np.log(np.diagonal(L, axis1=-2, axis2=-1)).sum(axis=-1)
+    squares = (nu * solve_spd(S, nu[..., None])[..., 0]).sum(axis=-1)
+    return -0.5 * ((~missing).sum(axis=-1) * _LOG_2PI + log_det + squares)
+
+
 def log_sum(a: Array, axis: int = -1) -> Array:
     """log sum exp(a) along an axis, -inf for nothing but -inf; no underflow."""
     top = a.max(axis=axis, keepdims=True)
     top = np.where(top > -np.inf, top, 0.0)
     with np.errstate(divide="ignore"):
         return (np.log(np.exp(a - top).sum(axis=axis, keepdims=True)) + top).squeeze(axis)
+
+
+def pack(log_weights: Array, means: Array, covs: Array) -> tuple[Components, Array]:
+    """The components with a weight first, in their order, and no more places than needed; the new places (..., c)."""
+    dead = log_weights == -np.inf
+    order = np.argsort(dead, axis=-1, kind="stable")
+    place = np.argsort(order, axis=-1, kind="stable")
+    count = int((~dead).sum(axis=-1).max(initial=1))
+    order = order[..., :count]
+    return Components(np.take_along_axis(log_weights, order, axis=-1),
+                      np.take_along_axis(means, order[..., None], axis=-2),
+                      np.take_along_axis(covs, order[..., None, None], axis=-3)), place
 
 
 def _joint(m: Components, x: Array) -> Array:

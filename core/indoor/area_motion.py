@@ -115,9 +115,10 @@ def _roam(w: Walkers, i: Numbers) -> Numbers:
     w.position[:, 0][i] = x + reach * ux                  # right for all that are far from walls and doors
     w.position[:, 1][i] = y + reach * uy
     w.left[i] = 0.0
-    far = w.clear.at(a, x, y) > np.maximum(reach + r, 2.0 * r)
+    near = w.clear.near(a, x, y, reach, np.maximum(reach + r, 2.0 * r))
+    far = np.ones(len(i), bool)
+    far[near] = False
     w.held[i[far]] = False
-    near = np.flatnonzero(~far)
     if not near.size:
         return near
     p, u = np.stack([x[near], y[near]], axis=1), np.stack([ux[near], uy[near]], axis=1)
@@ -194,17 +195,15 @@ def _first_door(w: Walkers, i: Numbers, a: Numbers, p: Array, u: Array, reach: A
     """
     r = w.walk.capture_radius_m
     distance, number = np.full(len(i), np.inf), np.zeros(len(i), np.intp)
-    doors = w.maps.doors[a]                                # (M, J, 2)
-    cx, cy = doors[..., 0] - p[:, :1], doors[..., 1] - p[:, 1:]
+    cx = w.maps.doors[:, :, 0].T[:, a] - p[:, 0]          # (J, M): the long axis last
+    cy = w.maps.doors[:, :, 1].T[:, a] - p[:, 1]
     squares = cx * cx + cy * cy
-    near = squares <= (reach + r)[:, None] ** 2
-    far_enough = squares > 4.0 * r * r
-    held = w.held[i] & ~far_enough
-    w.held[i] = held
-    k, j = np.nonzero(near & ~held)
+    held = w.held[i].T & (squares <= 4.0 * r * r)
+    w.held[i] = held.T
+    j, k = np.nonzero((squares <= (reach + r) ** 2) & ~held)
     if not k.size:
         return Doors(distance, number)
-    x, y = cx[k, j], cy[k, j]
+    x, y = cx[j, k], cy[j, k]
     along = x * u[k, 0] + y * u[k, 1]
     inside = x * x + y * y <= r * r
     room = r * r - (x * x + y * y - along * along)

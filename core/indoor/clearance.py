@@ -19,18 +19,19 @@ class Clearance(NamedTuple):
 
         first[a] + floor((y - y0[a]) per_m[a]) columns[a] + floor((x - x0[a]) per_m[a])
 
-    and metres[cell] <= the distance from any of its points to the nearest wall or door.
+    and walls[cell], doors[cell] <= the distances from any of its points to the nearest wall and the nearest door.
     """
 
-    metres: Array
+    walls: Array
+    doors: Array
     first: Numbers
-    columns: Array
+    columns: Numbers
     x0: Array
     y0: Array
     per_m: Array
 
-    def at(self, a: Numbers, x: Array, y: Array) -> Array:
-        """A lower bound of the clearance of the points (x, y) (M,) in their areas a (M,); 0 outside."""
+    def near(self, a: Numbers, x: Array, y: Array, wall_m: Array, door_m: Array) -> Numbers:
+        """Numbers of the points (x, y) (M,) in areas a (M,) that may be within wall_m of a wall or door_m of a door."""
         scale = self.per_m[a]
         column = (x - self.x0[a]) * scale
         row = (y - self.y0[a]) * scale
@@ -38,17 +39,19 @@ class Clearance(NamedTuple):
         cell *= self.columns[a]
         cell += column.astype(np.intp)
         cell += self.first[a]
-        return self.metres.take(cell, mode="clip")
+        close = self.walls.take(cell, mode="clip") <= wall_m
+        close |= self.doors.take(cell, mode="clip") <= door_m
+        return np.flatnonzero(close)
 
 
 def clearance(graph: FloorGraph) -> Clearance:
-    """max(|c - nearest wall or door| - half the diagonal of a cell, 0), c the middle of the cell; made once."""
+    """|c - nearest wall or door| - half the diagonal of a cell, c the middle of the cell; made once."""
     return graph.cached("clearance", lambda: _make(graph))
 
 
 def _make(graph: FloorGraph) -> Clearance:
     maps = map_arrays(graph)
-    metres, first, columns, low, cells = [], [], [], [], []
+    walls, doors, first, columns, low, cells = [], [], [], [], [], []
     count = 0
     for k, area in enumerate(graph.areas.values()):
         P = area.polygon
@@ -57,15 +60,16 @@ def _make(graph: FloorGraph) -> Clearance:
         x0, y0 = P.min(axis=0) - cell                     # a rim of cells outside catches round-off
         nx, ny = (np.ceil(size / cell) + 2).astype(int)
         centres = np.stack(np.meshgrid(x0 + cell * (np.arange(nx) + 0.5), y0 + cell * (np.arange(ny) + 0.5)), axis=-1)
-        distance = nearest_on_border(P, centres).distance
-        for j in range(len(area.accessor_nodes)):
-            distance = np.minimum(distance, np.sqrt(np.square(centres - maps.doors[k, j]).sum(axis=-1)))
-        metres.append(np.maximum(distance - cell / np.sqrt(2.0), 0.0).ravel())
+        centres = centres.reshape(-1, 2)
+        loss = cell / np.sqrt(2.0)
+        walls.append(nearest_on_border(P, centres).distance - loss)
+        to_doors = np.square(centres[:, None] - maps.doors[k]).sum(axis=-1)
+        doors.append(np.sqrt(to_doors.min(axis=1, initial=1e18)) - loss)
         first.append(count)
         columns.append(nx)
         low.append((x0, y0))
         cells.append(cell)
         count += nx * ny
     x0, y0 = np.array(low).reshape(-1, 2).T.copy()
-    return Clearance(np.concatenate(metres) if metres else np.zeros(1), np.array(first, np.intp),
-                     np.array(columns, np.intp), x0, y0, 1.0 / np.array(cells))
+    walls, doors = (np.concatenate(c) if c else np.zeros(1) for c in (walls, doors))
+    return Clearance(walls, doors, np.array(first, np.intp), np.array(columns, np.intp), x0, y0, 1.0 / np.array(cells))

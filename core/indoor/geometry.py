@@ -144,12 +144,13 @@ def exits(edges: Border, p: Array, q: Array) -> Crossings:
     edges of a counterclockwise polygon; p, q (M, 2), p inside or on the border.  A corner belongs to both its edges.
     A segment that starts on the border and leaves at once has t = 0; one that runs along an edge does not leave.
     """
-    s0 = p @ edges.normal.T - edges.offset
-    s1 = q @ edges.normal.T - edges.offset
-    segment, edge = np.nonzero((s1 > 0.0) & (s0 <= SLACK_M) & (s1 > s0))
+    nx, ny, c = edges.normal[:, :1], edges.normal[:, 1:], edges.offset[:, None]
+    s0 = nx * p[:, 0] + ny * p[:, 1] - c                  # (E, M): the long axis last
+    s1 = nx * q[:, 0] + ny * q[:, 1] - c
+    edge, segment = np.nonzero((s1 > 0.0) & (s0 <= SLACK_M) & (s1 > s0))
     if not len(segment):
         return Crossings(segment, edge, np.empty(0))
-    before, after = s0[segment, edge], s1[segment, edge]
+    before, after = s0[edge, segment], s1[edge, segment]
     t = np.maximum(-before, 0.0) / (after - before)
     at = p[segment] + t[:, None] * (q[segment] - p[segment]) - edges.start[edge]
     along = (at * edges.tangent[edge]).sum(axis=1)

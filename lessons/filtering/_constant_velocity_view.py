@@ -70,10 +70,17 @@ def _scene(p: "Params", r: "Result", at: Moment) -> list[Item]:
     else:
         items += [LevelEllipse("law", _law(r.laws, k), role="posterior", width=4, filled=True),
                   LevelEllipse("rival", _law(r.rival_laws, k), role="linearised", width=3.5, dashed=True)]
-    for j in range(every, done + 1, every):
-        top = r.laws.mean[j, :2] + [0.0, RADIUS * np.sqrt(r.laws.cov[j, 1, 1])]
-        items.append(Label(f"time_{j}", f"{j * _dt(p, r):.4g} s", top + [0.0, 0.012 * _height(r)], anchor="bottom"))
-    return items
+    return [*items, *_times(p, r, range(every, done + 1, every))]
+
+
+def _times(p: "Params", r: "Result", steps: range) -> list[Label]:
+    """The time over each ellipse, the last one first, where there is room for it."""
+    found: list[Label] = []
+    for j in reversed(steps):
+        top = r.laws.mean[j, :2] + [0.0, RADIUS * np.sqrt(r.laws.cov[j, 1, 1]) + 0.012 * _height(r)]
+        if all(np.abs(np.subtract(top, other.position)).max() > 0.07 * _height(r) for other in found):
+            found.append(Label(f"time_{j}", f"{j * _dt(p, r):.4g} s", top, anchor="bottom"))
+    return found
 
 
 def _height(r: "Result") -> float:

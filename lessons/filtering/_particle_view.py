@@ -42,7 +42,7 @@ def _note(p: "Params", r: "Result", k: int) -> str:
     drawn, carriers = len(r.run.index), len(r.carried[k - 1]) if k else 0
     if drawn == p.n_particles:
         return ""
-    others = f", and the {carriers} others that carry more than {CARRIER:.1%} of the weight each" if carriers else ""
+    others = f", and {carriers} more that each carry over {CARRIER:.1%} of the weight" if carriers else ""
     return f"{drawn:,} of {p.n_particles:,} particles are drawn{others}."
 
 

@@ -125,12 +125,11 @@ LESSON = Lesson(
     Params, compute, view, timeline=timeline, refs=("MAT 3.1", "MAT (3.3)", "MAT Definition 9"),
     presets={
         "four steps of 5 s": {},
-        "one step: Euler knows the place exactly": {"halvings": 0, "step": 1},
-        "64 steps: Euler has caught up": {"halvings": 6, "step": 64},
-        "constant acceleration within a step": {"scheme": "acceleration", "halvings": 0, "step": 1},
-        "the start of Example 20, steps of 1 s": {"horizon_s": 16.0, "halvings": 4, "start_sigma_m": 10.0,
-                                                  "start_sigma_mps": 3.0, "speed_mps": 5.0,
-                                                  "step": 16},
+        "one step of 20 s": {"halvings": 0, "step": 1},
+        "64 steps": {"halvings": 6, "step": 64},
+        "constant acceleration": {"scheme": "acceleration", "halvings": 0, "step": 1},
+        "Example 20 before any measurement": {"horizon_s": 16.0, "halvings": 4, "start_sigma_m": 10.0,
+                                              "start_sigma_mps": 3.0, "speed_mps": 5.0, "step": 16},
         "a calm velocity": {"sigma_c": 0.1, "horizon_s": 60.0},
     },
 )

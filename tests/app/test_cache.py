@@ -212,7 +212,8 @@ class Plain:
 
 @pytest.mark.parametrize("value", [
     np.zeros(1000), Pair(np.zeros(1000), None), Slotted(np.zeros(1000)), Plain(np.zeros(1000)),
-    [np.zeros(500), np.ones(500)], {"x": (np.zeros(1000),)}, Pair(np.zeros(500), Slotted(np.zeros(500))), Longer(np.zeros(900), np.zeros(100)),
+    [np.zeros(500), np.ones(500)], {"x": (np.zeros(1000),)},
+    Pair(np.zeros(500), Slotted(np.zeros(500))), Longer(np.zeros(900), np.zeros(100)),
 ], ids=lambda value: type(value).__name__)
 def test_size_counts_the_arrays_inside(value):
     assert 8000 <= size_of(value) < 8600

@@ -16,8 +16,7 @@ def labels_near(visit: Visit) -> np.ndarray:
     """The pixels round the texts of the scene, (n, 3)."""
     picture, view = visit.canvas(), visit.session.view
     assert view is not None
-    box = visit.page.locator("canvas[data-engine]").bounding_box()
-    assert box is not None
+    box = visit.canvas_box()
     found = []
     for primitive in lower(view, style_for(view.camera, THEMES["light"])):
         if primitive.kind == "label" and primitive.props["text"].strip():

@@ -10,7 +10,7 @@ import numpy as np
 from PIL import Image
 from playwright.sync_api import Locator, Page
 
-from app.draw.space import space_for
+from app.draw.space import Space, space_for
 from app.scenario import Scenario
 from app.server import App
 from app.session import Session
@@ -18,6 +18,9 @@ from app.web import adapter
 
 TIMEOUT = 60.0
 LOCAL = r"(?:(?:http|ws)://127\.0\.0\.1[:/]|data:|blob:|about:)"
+CANVAS = "canvas[data-engine]"
+# viser's own client says this whenever a node is grabbed; it has no effect
+HARMLESS = "Unable to preventDefault inside passive event listener invocation."
 OUTSIDE = re.compile(f"^(?!{LOCAL})")
 
 
@@ -84,29 +87,57 @@ class Visit:
     def canvas(self) -> np.ndarray:
         """The scene without what lies over it, as (height, width, 3) bytes."""
         self.drawn()
-        png = self.page.locator("canvas[data-engine]").screenshot(
+        png = self.page.locator(CANVAS).screenshot(
             style="#pk-overlay, .mantine-Notification-root { visibility: hidden !important; }")
         return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
 
-    def pixel(self, at: tuple[float, ...]) -> tuple[float, float]:
+    def pixel(self, at: tuple[float, float, float]) -> tuple[float, float]:
         """Where in the page a point of the scene (in the lesson's units) is seen."""
+        eye, axes, centre, scale = self._projection()
+        d = axes @ (self._space.display(at) - eye)
+        return (float(centre[0] + scale * d[0] / d[2]), float(centre[1] + scale * d[1] / d[2]))
+
+    def scene_point(self, pixel: tuple[float, float], level: tuple[float, float, float]) -> np.ndarray:
+        """The point of the scene that is seen at a pixel and lies as high as `level`."""
+        eye, axes, centre, scale = self._projection()
+        ray = axes.T @ np.array([*((np.asarray(pixel) - centre) / scale), 1.0])
+        height = self._space.display(level)[2]
+        return self._space.scene(eye + ray * (height - eye[2]) / ray[2])
+
+    @property
+    def _space(self) -> Space:
         assert self.session.view is not None
+        return space_for(self.session.view.camera)
+
+    def _projection(self) -> tuple[np.ndarray, np.ndarray, np.ndarray, float]:
+        """Eye in display units; axes right, down, forward as rows; the canvas's centre; pixels per unit of slope."""
         camera = self.session.client.camera
         eye, ahead, up = (np.asarray(v, np.float64) for v in (camera.position, camera.look_at, camera.up_direction))
         forward = (ahead - eye) / np.linalg.norm(ahead - eye)
         right = np.cross(forward, up)
         right /= np.linalg.norm(right)
-        d = space_for(self.session.view.camera).display(at) - eye
-        box = self.page.locator("canvas[data-engine]").bounding_box()
+        box = self.canvas_box()
+        centre = np.array([box["x"] + box["width"] / 2, box["y"] + box["height"] / 2])
+        scale = box["height"] / 2 / np.tan(camera.fov / 2)
+        return eye, np.stack([right, np.cross(forward, right), forward]), centre, float(scale)
+
+    def canvas_box(self) -> dict[str, float]:
+        """The canvas's place in the page."""
+        box = self.page.locator(CANVAS).bounding_box()
         assert box is not None
-        scale = box["height"] / 2 / np.tan(camera.fov / 2) / (d @ forward)
-        return (box["x"] + box["width"] / 2 + scale * float(d @ right),
-                box["y"] + box["height"] / 2 - scale * float(d @ np.cross(right, forward)))
+        return dict(box)
+
+    @property
+    def dragging(self) -> bool:
+        """Whether the server thinks that a handle is held."""
+        handles = self.session._handles
+        return handles is not None and handles.dragging
 
     def slider(self, label: str) -> Locator:
         return self.page.get_by_role("slider", name=label)
 
-    def drag(self, start: tuple[float, float], end: tuple[float, float], button: Literal["left", "right"] = "left") -> None:
+    def drag(self, start: tuple[float, float], end: tuple[float, float],
+             button: Literal["left", "right"] = "left") -> None:
         """Press at `start`, move in small steps to `end`, release."""
         mouse = self.page.mouse
         mouse.move(*start)
@@ -116,8 +147,8 @@ class Visit:
         mouse.up(button=button)
 
     def plot(self) -> str:
-        """The drawing of the first plot, as SVG."""
-        return self.page.locator(".js-plotly-plot .main-svg").first.inner_html()
+        """The drawing of the plot that is shown, as SVG."""
+        return "".join(self.page.locator(".js-plotly-plot .main-svg").evaluate_all("all => all.map(e => e.innerHTML)"))
 
     def readouts(self) -> str:
         return self.page.locator(".pk-readouts").inner_text()
@@ -127,7 +158,7 @@ class Visit:
         return "\n".join(self.page.get_by_role("alert").all_inner_texts())
 
     def _said(self, message: Any) -> None:
-        if message.type == "error":
+        if message.type == "error" and message.text != HARMLESS:
             self.complaints.append(f"console: {message.text}")
 
     def _asked(self, url: str) -> None:
