@@ -25,7 +25,7 @@ def core_functions(entry: Entry) -> list[tuple[str, str]]:
     """Qualified name and source of what the lesson uses of `core`, its private siblings included, in order."""
     found: dict[str, Any] = {}
     for module in _modules(entry):
-        for name, thing in _used(module):
+        for thing in _used(module):
             if (inspect.isfunction(thing) or inspect.isclass(thing)) and thing.__module__.startswith("core."):
                 found[f"{thing.__module__}.{thing.__qualname__}"] = thing
     return [(name, inspect.getsource(thing)) for name, thing in found.items()]
@@ -77,8 +77,8 @@ def _modules(entry: Entry) -> Iterator[ModuleType]:
             yield importlib.import_module(node.module)
 
 
-def _used(module: ModuleType) -> Iterator[tuple[str, Any]]:
-    """Names imported from core modules, and attributes of imported core modules."""
+def _used(module: ModuleType) -> Iterator[Any]:
+    """What is imported from core modules, and attributes of imported core modules."""
     aliases: dict[str, ModuleType] = {}
     tree = _tree(module)
     for node in ast.walk(tree):
@@ -89,12 +89,12 @@ def _used(module: ModuleType) -> Iterator[tuple[str, Any]]:
                 if thing is None or inspect.ismodule(thing):
                     aliases[name.asname or name.name] = importlib.import_module(f"{node.module}.{name.name}")
                 else:
-                    yield name.name, thing
+                    yield thing
     for node in ast.walk(tree):
         if isinstance(node, ast.Attribute) and isinstance(node.value, ast.Name) and node.value.id in aliases:
             thing = getattr(aliases[node.value.id], node.attr, None)
             if thing is not None:
-                yield node.attr, thing
+                yield thing
 
 
 @cache

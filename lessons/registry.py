@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 CHAPTERS: dict[str, tuple[str, ...]] = {
     "background": ("rotation_vector",),
     "static": (),
-    "filtering": ("constant_velocity", "kalman", "unscented", "particle_vs_ekf"),
+    "filtering": ("constant_velocity", "kalman", "innovation", "unscented", "nonlinear_compared", "resampling", "particle_vs_ekf"),
     "bayes_kalman": (),
     "indoor": (),
 }

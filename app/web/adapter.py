@@ -176,7 +176,7 @@ def _checked_update(client: viser.ClientHandle) -> Callable[..., Any]:
         if widget is None or not isinstance(message.updates, dict) or set(message.updates) != {"value"}:
             return
         value, options = message.updates["value"], getattr(widget._impl.props, "options", None)
-        if not acceptable(widget._impl.value, value) or options is not None and value not in options:
+        if not acceptable(widget._impl.value, value) or (options is not None and value not in options):
             log.warning("client %s: ignored the value %.80r of a widget", client_id, value)
             return
         await inner(client_id, message)

@@ -9,7 +9,6 @@ from numpy.typing import ArrayLike, NDArray
 from core.checks import finite
 from core.indoor.cloud import Numbers
 from core.indoor.geometry import Border, Crossings, border, exits
-from core.indoor.map_arrays import MapArrays
 from core.indoor.walkers import Walkers, choose
 from core.types import Array
 

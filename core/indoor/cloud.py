@@ -91,7 +91,7 @@ def place(
         offset = finite("offset_m", offset_m) + zero
         if direction not in (-1, 1):
             raise ValueError(f"direction: expected 1 or -1, got {direction}")
-        if not (0.0 <= offset.min(initial=0.0) and offset.max(initial=0.0) <= length):
+        if not (offset.min(initial=0.0) >= 0.0 and offset.max(initial=0.0) <= length):
             raise ValueError(f"offset_m: expected numbers from 0 to {length:g}, the length of {object_id!r}, got "
                              f"{offset_m}")
         return _cloud(maps, objects, offset, zero + direction, np.zeros((N, 2)), zero, speed)

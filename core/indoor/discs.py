@@ -67,7 +67,7 @@ def disc_area_in_polygon(polygon: ArrayLike, centre: ArrayLike, radius_m: float)
         points = [a + s * (b - a) for s in t]
         total += _sector(points[0], points[1], r) + _sector(points[2], points[3], r)
         total += 0.5 * _cross(points[1], points[2])
-    return float(total)
+    return max(float(total), 0.0)
 
 
 def length_in_disc(start: ArrayLike, end: ArrayLike, centre: ArrayLike, radius_m: float) -> Array:

@@ -32,7 +32,7 @@ def room_corridor(length_m: float = 50.0, spacing_m: float = 5.0, room_m: float 
     >>> len(g.links), g.total_length_m
     (19, 86.0)
     """
-    n = max(int(round(length_m / spacing_m)), 1)
+    n = max(round(length_m / spacing_m), 1)
     nodes = {f"c{k}": (length_m * k / n, 0.0) for k in range(n + 1)}
     links = {f"s{k}": (f"c{k - 1}", f"c{k}") for k in range(1, n + 1)}
     for k in range(1, n):

@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike
 from core.checks import finite
 from core.cloud import AllWeightsZero
 from core.indoor.cloud import Cloud, Numbers, gather, put, scatter
-from core.indoor.estimates import Projection, project
 from core.indoor.graph import FloorGraph
 from core.indoor.motion import Choices, advance
+from core.indoor.point_estimates import Projection, project
 from core.indoor.signal import AccessPoints
 from core.indoor.walk import Walk
 from core.resampling import draw
@@ -33,8 +33,8 @@ class Belief(NamedTuple):
 
 
 class Recovery(NamedTuple):
-    """When to look elsewhere: if the best log-likelihood falls short of the typical one by more than `shortfall` nats in
-    `scans` scans in a row, the share `share` of the particles is scattered over the whole map.  All numbers are ours.
+    """When to look elsewhere: the best log-likelihood falls short of the typical one by more than `shortfall` nats, in
+    `scans` scans in a row.  Then the share `share` of the particles is scattered over the map.  The numbers are ours.
     """
 
     shortfall: float = 25.0
@@ -152,7 +152,7 @@ def _scatter_some(
 ) -> tuple[Cloud, Array, Numbers]:
     """(1 - share) p + share u: a resampled cloud of which some particles are scattered over the map."""
     N = len(log_w)
-    if not np.ptp(log_w) == 0.0:
+    if log_w.min() < log_w.max():
         cloud = gather(cloud, draw("systematic", _normalised(log_w)[0], rng))
     some = np.sort(rng.permutation(N)[: int(np.ceil(share * N))])
     if some.size:

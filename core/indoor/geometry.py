@@ -169,10 +169,12 @@ def is_simple(polygon: ArrayLike) -> tuple[bool, str]:
     if (repeated := np.flatnonzero((P == Q).all(axis=1))).size:
         i = int(repeated[0])
         return False, f"corners {i} and {(i + 1) % V} are the same point {_point(P[i])}"
+    before = np.roll(P, 1, axis=0)
+    folds = (_side(before, P, Q) == 0.0) & (np.vecdot(P - before, Q - P) < 0.0)
+    if folds.any():
+        i = int(folds.argmax())
+        return False, f"the border turns back on itself at corner {i}, {_point(P[i])}"
     for i in range(V):
-        fold = _side(P[i - 1], P[i], Q[i]) == 0 and np.dot(P[i] - P[i - 1], Q[i] - P[i]) < 0
-        if fold:
-            return False, f"the border turns back on itself at corner {i}, {_point(P[i])}"
         others = np.arange(i + 2, V if i else V - 1)      # edges that share no corner with edge i
         if others.size:
             a, b = P[others], Q[others]

@@ -15,7 +15,7 @@ from core.types import Array
 
 
 class Run(NamedTuple):
-    """Summaries of T epochs, as in `Step`; and the steps themselves, thinned to M particles with the numbers index (M,).
+    """Summaries of T epochs, as in `Step`; and the steps, thinned to the M particles with the numbers index (M,).
 
     time_s, n_eff, log_evidence, floor, resampled, scanned (T,); mean, projected (T, 2), cov (T, 2, 2); object_ids: the
     objects of `projected`.  steps: T records whose clouds hold M particles; their weights are scaled to sum 1 over

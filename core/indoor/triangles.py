@@ -12,7 +12,7 @@ def triangulate(polygon: ArrayLike) -> Array:
 
     polygon (V, 2) simple, either orientation -> (V - 2, 3, 2), counterclockwise.  An ear is a convex corner whose
     triangle holds no other corner; every simple polygon has two (Meisters 1975).  ValueError if none is found, which
-    happens only when the border crosses itself.
+    happens only (and not always) when the border crosses itself.
 
     >>> len(triangulate([[0, 0], [4, 0], [4, 4], [2, 1], [0, 4]]))
     3

@@ -1,30 +1,25 @@
-"""How both filters are drawn: tracks and ellipses, the numbers of one step, and five plots after Figures 4.1-4.4."""
+"""The numbers of one step of both filters, and five plots after Figures 4.2-4.4."""
 
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from core.types import Array, Gaussian
+from core.types import Array
+from lessons.bayes_kalman._random_walk_scene import GAIN, PREDICT, ROLES, UPDATE, camera, scene
 from lessons.kit import figures as fig
 from lessons.kit.equations import Equation, Piece
 from lessons.kit.lesson import Moment, Readout, View
-from lessons.kit.roles import Role
-from lessons.kit.scene import Item, Label, LevelEllipse, Plane, Points, Polyline
 
 if TYPE_CHECKING:
     import plotly.graph_objects as go
 
-    from lessons.bayes_kalman.random_walk import Params, Result, Track
-
-PREDICT, GAIN, UPDATE = range(3)
-ROLES: dict[str, Role] = {"stiff": "kf", "flexible": "ukf"}
-AROUND = 11                              # points before and after the middle of the "turn" window
+    from lessons.bayes_kalman.random_walk import Params, Result
 
 
 def view(p: "Params", r: "Result", at: Moment) -> View:
     """Both filters up to this step; the step itself up to this stage."""
     return View(
-        scene=_scene(r, at), camera=_camera(p, r), figures=_figures(p, r, at.step), readouts=_readouts(r),
+        scene=scene(r, at), camera=camera(r), figures=_figures(p, r, at.step), readouts=_readouts(r),
         equations=_equations(r, at), caption=f"k = {at.step} of {len(r.stiff.errors)}", note=_note(p),
     )
 
@@ -33,67 +28,11 @@ def _note(p: "Params") -> str:
     """What does not fit together in this setting."""
     said = []
     if (p.R_x_m, p.R_y_m) != (p.noise_x_m, p.noise_y_m):
-        said.append(f"The noise is drawn with σ = ({p.noise_x_m:g}, {p.noise_y_m:g}) m, the filters assume "
-                    f"({p.R_x_m:g}, {p.R_y_m:g}) m (K9).")
+        said.append(f"Noise drawn with σ = ({p.noise_x_m:g}, {p.noise_y_m:g}) m, assumed ({p.R_x_m:g}, {p.R_y_m:g}) m "
+                    "(K9).")
     if p.start_twice:
-        said.append("The first sample is used twice (K10).")
+        said.append("First sample used twice (K10).")
     return " ".join(said)
-
-
-def _law(g: Gaussian, i: int) -> Gaussian:
-    return Gaussian(g.mean[i], g.cov[i])
-
-
-def _posterior(t: "Track", k: int) -> Gaussian:
-    return t.start if k == 0 else _law(t.steps.posterior, k - 1)
-
-
-def _estimates(t: "Track") -> Array:
-    return np.vstack([t.start.mean[:2], t.steps.posterior.mean[:, :2]])
-
-
-def _now(r: "Result", k: int) -> int:
-    """The point of the walk that the estimate of step k is about."""
-    return max(k - 1 + r.offset, 0)
-
-
-def _scene(r: "Result", at: Moment) -> list[Item]:
-    k, stage = at.step, at.stage
-    now, done = _now(r, k), k if stage == UPDATE or k == 0 else k - 1
-    seen = now if k == 0 or stage >= GAIN else now - 1
-    items: list[Item] = []
-    if seen >= 0:
-        items.append(Points("measurements", r.y[:seen + 1], role="measurement", size=6))
-    items += [Polyline("truth", r.truth, role="truth", dashed=True, width=2.5),
-              Points("truth_now", r.truth[[now]], role="truth", size=11, shape="diamond")]
-    for name, t in (("flexible", r.flexible), ("stiff", r.stiff)):
-        path = _estimates(t)[:done + 1]
-        if len(path) > 1:
-            items.append(Polyline(name, path, role=ROLES[name], width=4))
-        if k > 0 and stage < UPDATE:
-            items.append(LevelEllipse(f"{name}_prior", _law(t.steps.prior, k - 1), role=ROLES[name], dashed=True))
-        else:
-            items.append(LevelEllipse(f"{name}_posterior", _posterior(t, k), role=ROLES[name], filled=True))
-    if k > 0 and stage >= GAIN:
-        items.append(Points("measurement_now", r.y[[now]], role="measurement", size=12))
-        items.append(Label("y_label", "y", r.y[now], anchor="bottom"))
-    return items
-
-
-def _camera(p: "Params", r: "Result") -> Plane:
-    """The whole walk, its beginning, or the place where the stiff filter is worst."""
-    tracks = [_estimates(t) for t in (r.stiff, r.flexible)]
-    if p.zoom == "walk":
-        shown = np.vstack([r.truth, r.y, *(t[1:] for t in tracks)])
-    else:
-        worst = _now(r, 1 + int(np.square(r.stiff.errors[AROUND:]).sum(axis=1).argmax()) + AROUND)
-        middle = AROUND // 2 if p.zoom == "start" else min(worst, len(r.truth) - AROUND)
-        piece = slice(max(middle - AROUND, 0), middle + AROUND)
-        shown = np.vstack([r.truth[piece], r.y[piece], *(t[1:][piece] for t in tracks)])
-    low, high = shown.min(axis=0), shown.max(axis=0)
-    margin = 0.05 * (high - low).max()
-    (x0, y0), (x1, y1) = low - margin, high + margin
-    return Plane((float(x0), float(x1)), (float(y0), float(y1)))
 
 
 def _equations(r: "Result", at: Moment) -> list[Equation]:
@@ -132,7 +71,7 @@ def _readouts(r: "Result") -> list[Readout]:
 
 
 def _with_axes(values: Array) -> str:
-    return f"{values[0]:.2f} (x {values[1]:.2f}, y {values[2]:.2f})"
+    return f"{values[0]:.2f} ({values[1]:.2f}, {values[2]:.2f})"
 
 
 def _figures(p: "Params", r: "Result", k: int) -> dict[str, "go.Figure"]:

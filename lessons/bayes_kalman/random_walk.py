@@ -44,7 +44,6 @@ class Params:
     noise_y_m: float = slider(1.0, low=0.0, high=10.0, step=0.1, unit="m", group="truth")
     seed: int = seed(69, group="truth")
     axis: str = choice("y", ("x", "y"), group="view")
-    zoom: str = choice("walk", ("walk", "start", "turn"), group="view")
 
 
 class Track(NamedTuple):
@@ -158,10 +157,10 @@ LESSON = Lesson(
     refs=("KF thesis 4.1-4.2", "KF thesis (4.1)-(4.7)", "KF thesis Tables 4.1, 4.2", "KF thesis Figures 4.1-4.4"),
     presets={
         "Table 4.2 as printed": {},
-        "K8: start velocities swapped": {"v0_stiff": "fast", "v0_flexible": "slow", "zoom": "start", "step": 4},
+        "K8: start velocities swapped": {"v0_stiff": "fast", "v0_flexible": "slow", "step": 4},
         "K9: the filters know the noise (R = I)": {"R_y_m": 1.0},
         "K9: the noise is as assumed (4 m in y)": {"noise_y_m": 4.0},
-        "K10: the first sample only once": {"start_twice": False, "zoom": "start", "step": 1},
+        "K10: the first sample only once": {"start_twice": False, "step": 1},
         "K11: a walk from the filters' model": {"world": "model", "R_y_m": 1.0},
         "Table 4.2 as corrected": {**AS_CORRECTED, "R_y_m": 1.0},
         "a straight walk": {**AS_CORRECTED, "R_y_m": 1.0, "spread_deg": 0.5},

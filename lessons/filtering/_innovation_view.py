@@ -105,7 +105,7 @@ def _camera(p: "Params", r: "Result") -> Plane:
     reach = 0.25 * float((high - low).max())
     near = r.y[((r.y > low - reach) & (r.y < high + reach)).all(axis=1)]
     low, high = np.vstack([low, near]).min(axis=0), np.vstack([high, near]).max(axis=0)
-    margin = 0.07 * float((high - low).max())
+    margin = 0.1 * float((high - low).max())
     (x0, y0), (x1, y1) = low - margin, high + margin
     return Plane((float(x0), float(x1)), (float(y0), float(y1)))
 
@@ -147,8 +147,7 @@ def _readouts(r: "Result") -> list[Readout]:
         Readout("rmse_plain", error(r.plain), "m", 3),
         Readout("garbage_rejected", f"{int((bad & ~ok).sum())} of {int(bad.sum())}"),
         Readout("good_rejected", f"{int((~bad & ~ok).sum())} of {int((~bad).sum())}"),
-        Readout("mean_nis", float(r.used.nis[ok].mean()) if count else None, digits=3),
-        Readout("nis_band", f"{low:.2f} … {high:.2f}"),
+        Readout("mean_nis", f"{r.used.nis[ok].mean():.2f} ({low:.2f} … {high:.2f})" if count else None),
         Readout("many_nis", r.many_nis, digits=3),
         Readout("many_correlation", round(float(r.many_correlation[0]), 3), digits=2),
     ]
@@ -188,7 +187,7 @@ def _figures(p: "Params", r: "Result", k: int) -> dict[str, "go.Figure"]:
         true, assumed = (np.full(2, s) for s in ((p.sigma_x_m, p.sigma_y_m)[axis],
                                                  p.r_ratio * (p.sigma_x_m, p.sigma_y_m)[axis]))
         found["noise"] = fig.chart(
-            fig.line("true", ends, true, "truth", dash=True), fig.line("assumed", ends, assumed, "vector", dash=True),
+            fig.line("real", ends, true, "truth", dash=True), fig.line("assumed", ends, assumed, "vector", dash=True),
             fig.line("learnt", t, np.sqrt(r.used.R[:, axis, axis]), "kf"), cursor=k)
     return found
 

@@ -34,7 +34,7 @@ def view(p: "Params", r: "Result", at: Moment) -> View:
     base = _base(r)
     scene = [*_bars(r), *(_wheel(r, at, base) if p.shape == "wheel" else _staircase(p, r, at, base)),
              *_copies(r, at)]
-    camera = Plane((-1.6, 10.4), (_floor(r) - 0.2, base + TALL + 0.9), axes=False)
+    camera = Plane((-2.0, 10.4), (_floor(r) - 0.2, base + TALL + 1.0), axes=False)
     return View(scene=scene, camera=camera, figures=_figures(p, r), readouts=_readouts(p, r),
                 equations=_equations(p, r, at), caption=_caption(p, r, at), note=_note(p, r, at))
 
@@ -62,7 +62,7 @@ def _base(r: "Result") -> float:
 
 
 def _floor(r: "Result") -> float:
-    return -1.5 - 0.45 * float(r.copies.max())
+    return -1.5 - 0.45 * float(np.unique(r.children, return_counts=True)[1].max())
 
 
 def _used(r: "Result", at: Moment) -> tuple[int, int]:
@@ -98,7 +98,7 @@ def _staircase(p: "Params", r: "Result", at: Moment, base: float) -> list[Item]:
     treads = np.stack([np.column_stack([r.x, steps[1:]]), np.column_stack([ends, steps[1:]])], axis=1)
     items: list[Item] = [
         Polyline("scale", [(LEFT, base), (LEFT, base + TALL)], role="muted", width=1.8),
-        Label("scale_title", "cumulative weight c, points z", (LEFT - 0.9, base + TALL + 0.25), 0.9, "left"),
+        Label("scale_title", "cumulative weight c, points z", (LEFT - 0.9, base + TALL + 0.4), 0.9, "left"),
         Segments("treads", np.concatenate([treads, [[[LEFT, base], [r.x[0], base]]]]), role="pf", width=1.8, fade=0.35),
         Segments("stairs", risers, role="pf", width=9.0),
         Label("scale_0", "0", (LEFT - 0.15, base), 0.85, "right"),
@@ -162,7 +162,7 @@ def _wheel(r: "Result", at: Moment, base: float) -> list[Item]:
 def _copies(r: "Result", at: Moment) -> list[Item]:
     """The children under their parents, in the order in which they were made."""
     done, _ = _used(r, at)
-    items: list[Item] = [Label("copies_title", "copies", (-1.5, -1.3), 0.9, "left")]
+    items: list[Item] = [Label("copies_title", "copies", (-1.9, -1.3), 0.9, "left")]
     if not done:
         return items
     x, wrong = r.children[:done], _wrong(r)[:done]
@@ -191,13 +191,13 @@ def _equations(p: "Params", r: "Result", at: Moment) -> list[Equation]:
         lines += [
             ("point", POINT, COMBS[p.scheme], (r",\quad z_i =", float(r.z[i - outright]))),
             ("search", SEARCH, r"c_{j-1} < z_i \leq c_j",
-             (r":\quad", low, "<", float(r.z[i - outright]), r"\leq", float(r.stairs[j]), r",\quad j =", float(j + 1))),
+             (r":\quad", low, "<", float(r.z[i - outright]), r"\leq", float(r.stairs[j]), rf",\quad j = {j + 1}")),
         ]
     lines += [
         ("copy", COPY, r"\mathbf{x}^{i}_{\mathrm{new}} = \mathbf{x}^{j}" if p.gather == "new"
          else r"\mathbf{x}^{i} := \mathbf{x}^{j}", ("=", float(r.children[i]), r"\,\mathrm{m}")),
-        ("copies", COPY, r"n_j", ("=", np.bincount(r.ancestors[:at.step], minlength=p.n).astype(float)[None],
-                                  r",\quad N\omega^j =", (p.n * r.w)[None])),
+        ("copies", COPY, r"n_j", ("=", np.bincount(r.ancestors[:at.step], minlength=p.n).astype(float)[None])),
+        ("shares", COPY, r"N\omega^j", ("=", (p.n * r.w)[None])),
     ]
     def running(name: str, stage: int) -> bool:
         if name == "outright":                       # such a copy needs neither a point nor a search
@@ -205,7 +205,7 @@ def _equations(p: "Params", r: "Result", at: Moment) -> list[Equation]:
         return stage == at.stage
 
     return [start, *(Equation(name, (rule, *numbers) if stage <= at.stage else (rule,), current=running(name, stage),
-                              digits=3) for name, stage, rule, numbers in lines)]
+                              digits=1 if name in ("outright", "copies") else 3) for name, stage, rule, numbers in lines)]
 
 
 def _readouts(p: "Params", r: "Result") -> list[Readout]:

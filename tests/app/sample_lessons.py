@@ -23,7 +23,10 @@ class Params:
     seed: int = seed(7)
     last: int = slider(6, low=1, high=60)
 
+COMPUTED = []
+
 def compute(p, progress):
+    COMPUTED.append(p)
     x = np.linspace(0.0, 6.0, 25)
     return np.column_stack([x, p.amplitude * np.sin(x + 0.1 * p.seed)])
 
@@ -92,13 +95,13 @@ SLOW = STILL % '''
 BEGUN, DONE = [], []
 
 def compute(p, progress):
-    """One second of work that shares the interpreter with other threads."""
+    """One second of work on large arrays, as in a particle filter."""
     if p.target == 0.0:
         return 0.0
     BEGUN.append(p.target)
-    begun = time.monotonic()
+    x, begun = np.full(100_000, p.target), time.monotonic()
     while (spent := time.monotonic() - begun) < 1.0:
-        np.linalg.eigvalsh(np.full((40, 40), p.target))
+        x = np.sin(x) + p.target
         progress(spent)
     DONE.append(p.target)
     return p.target

@@ -236,7 +236,8 @@ def test_messages_about_nothing_do_nothing(app, visit, kind, fields):
 def test_a_camera_that_makes_no_sense_changes_nothing_for_long(visit, camera):
     one = visit()
     good = {"wxyz": [1.0, 0, 0, 0], "position": [3.0, 3.0, 3.0], "look_at": [0.0, 0.0, 0.0],
-            "up_direction": [0, 0, 1.0], "fov": 0.8, "near": 0.01, "far": 1000.0, "image_width": 1000, "image_height": 700}
+            "up_direction": [0, 0, 1.0], "fov": 0.8, "near": 0.01, "far": 1000.0, "image_width": 1000,
+            "image_height": 700}
     one.browser.send("ViewerCameraMessage", **(good | camera))
     one.browser.send("ViewerCameraMessage", **good)
     one.browser.set("Amplitude", 5.0)

@@ -45,8 +45,8 @@ def test_link_with_mistakes_names_them(visit: Visit) -> None:
     params = visit.scenario.params
     assert (params.sigma_x_m, params.r_ratio) == (defaults.sigma_x_m, 20.0), "the default, and the nearest value"
     assert visit.scenario.moment == Moment(7, 3), "what is right is kept"
-    visit.until(lambda: query_of(visit) == {"lesson": "filtering.kalman", "r_ratio": "20", "step": "7", "fixedDpr": "1"},
-                "an address that is right")
+    right = {"lesson": "filtering.kalman", "r_ratio": "20", "step": "7", "fixedDpr": "1"}
+    visit.until(lambda: query_of(visit) == right, "an address that is right")
 
 
 def test_link_to_an_unknown_lesson(visit: Visit) -> None:

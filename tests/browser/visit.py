@@ -150,6 +150,10 @@ class Visit:
         """The drawing of the plot that is shown, as SVG."""
         return "".join(self.page.locator(".js-plotly-plot .main-svg").evaluate_all("all => all.map(e => e.innerHTML)"))
 
+    def server_value(self, field: Locator) -> object:
+        """What the server thinks that an input holds."""
+        return self.session.client.gui._gui_input_handle_from_uuid[field.get_attribute("id") or ""].value
+
     def readouts(self) -> str:
         return self.page.locator(".pk-readouts").inner_text()
 

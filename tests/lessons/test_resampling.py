@@ -140,13 +140,12 @@ def test_both_ends_of_every_parameter_are_finite(name):
     spec = parameters(lesson.Params)[name]
     ends = [(0.0, 0.0), (10.0, 10.0)] if spec.kind == "point" else spec.options or (spec.low, spec.high)
     for end in ends:
-        for scheme in lesson.SCHEMES:
-            p = replace(replace(DEFAULT, scheme=scheme, repetitions=100), **{name: spec.validate(end)})
-            v = shown(p)
-            assert all(np.isfinite(x.value) for x in v.readouts)
-            for f in v.figures.values():
-                assert all(np.isfinite(np.asarray(t.y, dtype=float)).all() for t in f.data)
-            assert len(result(p).ancestors) == p.n
+        p = replace(replace(DEFAULT, scheme="residual", repetitions=100), **{name: spec.validate(end)})
+        v = shown(p)
+        assert all(np.isfinite(x.value) for x in v.readouts)
+        for f in v.figures.values():
+            assert all(np.isfinite(np.asarray(t.y, dtype=float)).all() for t in f.data)
+        assert len(result(p).ancestors) == p.n
 
 
 def test_same_parameters_same_bytes():

@@ -49,6 +49,14 @@ def floor_weights(floor: ArrayLike, w: ArrayLike) -> dict[int, float]:
     return dict(zip(numbers.tolist(), np.bincount(index, w / w.sum()).tolist(), strict=True))
 
 
+def floor_rate(floor: ArrayLike, truth: ArrayLike) -> float:
+    """Share of the epochs with floor = truth.  Both (T,), T >= 1.  GBPF ch. 6 (ours)."""
+    floor, truth = np.asarray(floor), np.asarray(truth)
+    if floor.shape != truth.shape or floor.ndim != 1 or not floor.size:
+        raise ValueError(f"floor, truth: expected equal shapes (T,), T >= 1, got {floor.shape} and {truth.shape}")
+    return float((floor == truth).mean())
+
+
 def most_likely_floor(floor: ArrayLike, w: ArrayLike) -> int:
     """argmax over floors of the sum of the weights; the lowest of equals."""
     weights = floor_weights(floor, w)
