@@ -53,7 +53,7 @@ class Page:
     # -- building -----------------------------------------------------------------------------------------------
 
     def _right(self) -> None:
-        gui = self._gui
+        gui, session = self._gui, self._session
         gui.main_panel.dock_right()
         gui.main_panel.set_width(RIGHT_WIDTH)
         tabs = gui.add_tab_group()
@@ -73,7 +73,7 @@ class Page:
         with panel.add_tab("Timeline and numbers", viser.Icon.CLOCK):
             self._transport_folder = gui.add_folder(None)
             with self._transport_folder:
-                self.transport = Transport(gui, self._session.go, lambda: self._session.ready)
+                self.transport = Transport(gui, session.go, lambda: session.scenario.moment, lambda: session.ready)
             self._readouts = gui.add_html("")
         panel.dock_below(gui.main_panel)
 

@@ -5,7 +5,7 @@ from collections.abc import Callable
 from typing import Any
 
 from app.scenario import Scenario
-from lessons.kit.lesson import Timeline
+from lessons.kit.lesson import Moment, Timeline
 from lessons.kit.words import Words
 
 STEP_BACK, STAGE_BACK, STAGE_ON, STEP_ON = "\u25c2\u25c2 step", "\u25c2 stage", "stage \u25b8", "step \u25b8\u25b8"
@@ -23,14 +23,19 @@ def moves(timeline: Timeline) -> bool:
 
 
 class Transport:
-    """The timeline's widgets.  `go(step, stage)` moves the scenario; `ready()` tells whether it has been drawn."""
+    """The timeline's widgets.
 
-    def __init__(self, gui: Any, go: Go, ready: Callable[[], bool]) -> None:
+    `go(step, stage)` moves the scenario, `now()` is its moment (perhaps newer than what is shown), and `ready()`
+    tells whether it has been drawn.
+    """
+
+    def __init__(self, gui: Any, go: Go, now: Callable[[], Moment], ready: Callable[[], bool]) -> None:
         self._gui = gui
         self._go = go
+        self._now = now
         self._ready = ready
         self._timeline = Timeline(0)
-        self._step, self._stage = 0, 0
+        self._step = 0  # the one shown
         self._task: asyncio.Task[None] | None = None
         self._moves = gui.add_button_group("", (STEP_BACK, STAGE_BACK, STAGE_ON, STEP_ON),
                                            hint="Backwards or forwards: N and B, Shift+N and Shift+B")
@@ -57,8 +62,8 @@ class Transport:
 
             async def scrubbed(event: Any) -> None:
                 if event.client is not None:
-                    last = self._stage == len(timeline.stages) - 1
-                    self._go(int(self._scrubber.value), -1 if last else self._stage)
+                    stage = self._now().stage
+                    self._go(int(self._scrubber.value), -1 if stage == len(timeline.stages) - 1 else stage)
 
             self._scrubber.on_update(scrubbed)
         if len(timeline.stages) > 1:
@@ -68,27 +73,27 @@ class Transport:
 
             async def chosen(event: Any) -> None:
                 if event.client is not None and self._stages.value in names:
-                    self._go(self._step, names.index(self._stages.value))
+                    self._go(self._now().step, names.index(self._stages.value))
 
             self._stages.on_click(chosen)
 
     def show(self, scenario: Scenario) -> None:
         """Set the widgets to the scenario's moment."""
-        self._step, self._stage = scenario.moment.step, scenario.moment.stage
+        self._step = scenario.moment.step
         if self._scrubber is not None:
             self._scrubber.value = self._step
             self._scrubber.label = self._label()
         if self._stages is not None:
-            self._stages.label = f"Stage: {self._stage_names[self._stage]}"
+            self._stages.label = f"Stage: {self._stage_names[scenario.moment.stage]}"
 
     def step(self, by: int) -> None:
         """`by` steps on, at the same kind of moment: all stages done."""
-        self._go(self._step + by, -1)
+        self._go(self._now().step + by, -1)
 
     def stage(self, by: int) -> None:
         """One stage on or back, across the borders of steps."""
         last = len(self._timeline.stages) - 1
-        step, stage = self._step, self._stage + by
+        step, stage = self._now().step, self._now().stage + by
         if stage > last:
             step, stage = step + 1, 0
         elif stage < 0:
@@ -112,19 +117,23 @@ class Transport:
 
     async def _run(self) -> None:
         try:
-            still = self._timeline.steps == 0  # then the stages are what plays
-            last = len(self._timeline.stages) - 1 if still else self._timeline.steps
-            at = self._stage if still else self._step
+            at, last, still = self._progress()
             if at >= last:
                 at = -1
             while at < last:
-                at += 1
-                self._go(*((0, at) if still else (at, -1)))
+                self._go(*((0, at + 1) if still else (at + 1, -1)))
                 await asyncio.sleep(1.0 / SPEEDS.get(self._speed.value, 5.0) if not still else STAGE_SECONDS)
                 while not self._ready():
                     await asyncio.sleep(0.02)
+                at, last, still = self._progress()
         finally:
             self._play.label = PLAY
+
+    def _progress(self) -> tuple[int, int, bool]:
+        """How far the timeline has played, its end, and whether it is the stages that play (there is one step)."""
+        still = self._timeline.steps == 0
+        return ((self._now().stage, len(self._timeline.stages) - 1, True) if still
+                else (self._now().step, self._timeline.steps, False))
 
     async def _moved(self, event: Any) -> None:
         self.stop()

@@ -14,15 +14,15 @@ class Upkeep:
     """How a filter keeps its mixture in order: split before each measurement, prune and merge after it.
 
     split_beyond: components whose longest semi-axis (1 sigma, among the state's `entries`, None: all) exceeds this
-    length are split into `parts` of `ratio` times the length, up to three times (None: never).  prune_below: a weight.
-    merge_below: nats, see `merge`.  max_components: a prune leaves the 2 max_components heaviest, and the cheapest
-    merges bring them down to this number.  ValueError for limits outside their ranges.
+    length are split into `parts` of `ratio` times the length (see `split`), up to three times (None: never).
+    prune_below: a weight.  merge_below: nats, see `merge`.  max_components: a prune leaves the 2 max_components
+    heaviest, and the cheapest merges bring them down to this number.  ValueError for limits outside their ranges.
     """
 
     split_beyond: float | None = None
     entries: tuple[int, ...] | None = None
     parts: int = 3
-    ratio: float = 0.5
+    ratio: float | None = None
     prune_below: float = 1e-4
     merge_below: float = 1e-3
     max_components: int = 16

@@ -21,8 +21,9 @@ log = logging.getLogger(__name__)
 CHAPTERS: dict[str, tuple[str, ...]] = {
     "background": ("rotation_vector",),
     "static": (),
-    "filtering": ("constant_velocity", "kalman", "innovation", "unscented", "nonlinear_compared", "resampling", "particle_vs_ekf"),
-    "bayes_kalman": (),
+    "filtering": ("constant_velocity", "kalman", "innovation", "unscented", "nonlinear_compared", "monte_carlo",
+                  "resampling", "particle_vs_ekf"),
+    "bayes_kalman": ("gain", "random_walk"),
     "indoor": (),
 }
 

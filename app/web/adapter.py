@@ -13,6 +13,7 @@ import logging
 import math
 import secrets
 import time
+import warnings
 from collections.abc import Callable, Iterator
 from functools import cache, partial
 from pathlib import Path
@@ -47,6 +48,7 @@ def start_server(host: str, port: int, hosts: frozenset[str] = LOOPBACK) -> vise
     port 0 takes any free one.  The share, form and upload messages have no handlers.
     """
     rich.reconfigure(quiet=True)  # viser announces itself with it; the command line says what users need
+    warnings.filterwarnings("ignore", "Queued a .* on a closed connection")  # a browser may leave at any moment
     logging.getLogger("websockets").setLevel(logging.CRITICAL)  # a browser's spare connections are no errors
     with _guarded_serve(hosts):
         server = viser.ViserServer(host=host, port=port, label="Paikka", verbose=False)

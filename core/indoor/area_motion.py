@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from core.checks import finite
 from core.indoor.cloud import Numbers
-from core.indoor.geometry import Border, Crossings, border, exits
+from core.indoor.geometry import Border, border, exits, together
 from core.indoor.walkers import Walkers, choose
 from core.types import Array
 
@@ -52,7 +52,7 @@ def reflect(
     >>> p.round(6).tolist(), np.degrees(a).round(6).tolist()
     ([[-2.6, 5.843078]], [-60.0])
     """
-    edges = (border(polygon),)
+    edges = together([border(polygon)])
     p = finite("position", position, 2).reshape(-1, 2).copy()
     heading = finite("heading_rad", heading_rad) + np.zeros(len(p))
     left = finite("distance_m", distance_m) + np.zeros(len(p))
@@ -131,7 +131,7 @@ def _near_walls(w: Walkers, i: Numbers, a: Numbers, p: Array, u: Array, reach: A
     door = _first_door(w, i, a, p, u, free)
     decides = np.isfinite(door.distance)
     hits = ~decides & (wall.fraction <= 1.0)
-    event = np.flatnonzero(decides | hits)
+    event = (decides | hits).nonzero()[0]
     walked = np.where(decides, door.distance, free)[event]
     j = i[event]
     w.position[j, :2] = p[event] + walked[:, None] * u[event]
@@ -167,23 +167,14 @@ def _give_up(i: Numbers, count: Numbers, heading: Array, rng: np.random.Generato
     return i
 
 
-def _first_wall(borders: tuple[Border, ...], a: Numbers, p: Array, q: Array) -> Walls:
+def _first_wall(edges: Border, a: Numbers, p: Array, q: Array) -> Walls:
     """The first exit of the segments p q (M, 2) from their areas a (M,)."""
     fraction, normal = np.full(len(p), np.inf), np.zeros((len(p), 2))
-    for k, edges in enumerate(borders):
-        if len(borders) == 1:
-            out = exits(edges, p, q)
-        else:
-            here = np.flatnonzero(a == k)
-            if not here.size:
-                continue
-            out = exits(edges, p[here], q[here])
-            out = Crossings(here[out.segment], out.edge, out.fraction)
-        if out.segment.size:
-            last_first = np.argsort(-out.fraction, kind="stable")      # of several walls the nearest is written last
-            s, e, t = (c[last_first] for c in out)
-            fraction[s] = t
-            normal[s] = edges.normal[e]
+    out = exits(edges, p, q, a)
+    if out.segment.size:
+        s, e, t = (c[np.argsort(-out.fraction, kind="stable")] for c in out)   # the nearest of several is written last
+        fraction[s] = t
+        normal[s] = edges.normal[e, a[s]]
     return Walls(fraction, normal)
 
 

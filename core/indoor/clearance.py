@@ -41,7 +41,7 @@ class Clearance(NamedTuple):
         cell += self.first[a]
         close = self.walls.take(cell, mode="clip") <= wall_m
         close |= self.doors.take(cell, mode="clip") <= door_m
-        return np.flatnonzero(close)
+        return close.nonzero()[0]
 
 
 def clearance(graph: FloorGraph) -> Clearance:

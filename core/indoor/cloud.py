@@ -25,7 +25,7 @@ class Cloud(NamedTuple):
     counterclockwise.  position_m (N, 3) = g(x, T): x, y and the height; floor (N,), on stairs and in lifts that of the
     nearer end.  speed_mps (N,); stopped (N,) stands until it goes on; wait_s (N,) until the lift comes.  In an area:
     goal (N,) = the port by which the particle has decided to go on, -1 if none; held (N, J): accessor nodes where it
-    has decided already and that it has not left yet.
+    has decided already and that it had not left when it last set out.
     """
 
     object: Numbers

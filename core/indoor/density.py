@@ -74,8 +74,7 @@ def disc_probability(
         a, b = maps.floors[k]
         start, end = maps.origin[k], maps.origin[k] + maps.length[k] * maps.unit[k]
         middle = 0.5 * (start + end)
-        parts = [(start, end)] if a == b == floor else [(start, middle)] * (a == floor) + [(middle, end)] * (b == floor)
-        for s, e in parts:
+        for s, e in [part for f, part in ((a, (start, middle)), (b, (middle, end))) if f == floor]:
             plan = float(np.sqrt(np.square(e[:2] - s[:2]).sum()))
             if plan > 0.0:
                 share = float(length_in_disc(s[:2], e[:2], c, radius_m)) / plan

@@ -3,6 +3,7 @@
 A polygon is an array (V, 2) of corners in metres, without repeating the first corner at the end.
 """
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -18,7 +19,7 @@ class Border(NamedTuple):
     """The E edges of a counterclockwise polygon.
 
     start (E, 2), tangent (E, 2) unit vectors, length (E,), normal (E, 2) unit vectors out of the polygon, and
-    offset (E,) = normal . start.
+    offset (E,) = normal . start.  Of A polygons together, see `together`: (E, A, 2) and (E, A).
     """
 
     start: Array
@@ -138,23 +139,39 @@ def nearest_in_polygon(polygon: ArrayLike, points: ArrayLike) -> Array:
     return np.where(contains(polygon, x)[..., None], x, nearest_on_border(polygon, x).point)
 
 
-def exits(edges: Border, p: Array, q: Array) -> Crossings:
+def together(borders: Sequence[Border]) -> Border:
+    """The borders of A polygons as arrays (E, A, ...), filled up with edges that no segment can cross."""
+    E = max((len(b.length) for b in borders), default=0)
+
+    def filled(column: int, value: float, *shape: int) -> Array:
+        out = np.full((E, len(borders), *shape), value)
+        for k, b in enumerate(borders):
+            out[: len(b.length), k] = b[column]
+        return out
+
+    return Border(filled(0, 0.0, 2), filled(1, 0.0, 2), filled(2, 0.0), filled(3, 0.0, 2), filled(4, 1.0))
+
+
+def exits(edges: Border, p: Array, q: Array, a: NDArray[np.intp] | None = None) -> Crossings:
     """fraction t = (c - n . p) / (n . q - n . p) of every edge that the segment p q crosses from inside to outside.
 
-    edges of a counterclockwise polygon; p, q (M, 2), p inside or on the border.  A corner belongs to both its edges.
-    A segment that starts on the border and leaves at once has t = 0; one that runs along an edge does not leave.
+    edges of one counterclockwise polygon; or of several `together`, and then segment k runs in polygon a[k].  p, q
+    (M, 2), p inside or on the border.  A corner belongs to both its edges.  A segment that starts on the border and
+    leaves at once has t = 0; one that runs along an edge does not leave.
     """
-    nx, ny, c = edges.normal[:, :1], edges.normal[:, 1:], edges.offset[:, None]
+    to = (slice(None), None) if a is None else (slice(None), a)
+    nx, ny, c = edges.normal[..., 0][to], edges.normal[..., 1][to], edges.offset[to]
     s0 = nx * p[:, 0] + ny * p[:, 1] - c                  # (E, M): the long axis last
     s1 = nx * q[:, 0] + ny * q[:, 1] - c
-    edge, segment = np.nonzero((s1 > 0.0) & (s0 <= SLACK_M) & (s1 > s0))
+    edge, segment = ((s1 > 0.0) & (s0 <= SLACK_M) & (s1 > s0)).nonzero()
     if not len(segment):
         return Crossings(segment, edge, np.empty(0))
     before, after = s0[edge, segment], s1[edge, segment]
     t = np.maximum(-before, 0.0) / (after - before)
-    at = p[segment] + t[:, None] * (q[segment] - p[segment]) - edges.start[edge]
-    along = (at * edges.tangent[edge]).sum(axis=1)
-    hit = (along >= -SLACK_M) & (along <= edges.length[edge] + SLACK_M)
+    which = edge if a is None else (edge, a[segment])
+    at = p[segment] + t[:, None] * (q[segment] - p[segment]) - edges.start[which]
+    along = (at * edges.tangent[which]).sum(axis=1)
+    hit = (along >= -SLACK_M) & (along <= edges.length[which] + SLACK_M)
     return Crossings(segment[hit], edge[hit], t[hit])
 
 

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from core.indoor.geometry import Border, border, nearest_in_polygon, nearest_on_border
+from core.indoor.geometry import Border, border, nearest_in_polygon, nearest_on_border, together
 from core.indoor.graph import FloorGraph, Id
 from core.types import Array
 
@@ -23,7 +23,7 @@ class MapArrays(NamedTuple):
     object.  The ports of link k are 2k (first end) and 2k + 1; those of area a begin at area_port[a].  port_object,
     port_end (the number of the end or accessor node), port_node (P,).
 
-    Areas a = 0..A-1 with at most J accessor nodes: borders, doors (A, J, 2) = nearest points of the area to the
+    Areas a = 0..A-1 with at most J accessor nodes: borders of all areas together, doors (A, J, 2) = nearest points of the area to the
     accessor nodes (far away if a has fewer), inward (A, J) = direction into the area in radians, NaN for a door far
     from the border.  door (A, nodes) = number of the accessor node in the area, -1 if it is none of its own.
     """
@@ -41,7 +41,7 @@ class MapArrays(NamedTuple):
     port_end: NDArray[np.intp]
     port_node: NDArray[np.intp]
     area_port: NDArray[np.intp]
-    borders: tuple[Border, ...]
+    borders: Border
     doors: Array
     inward: Array
     door: NDArray[np.intp]
@@ -87,7 +87,7 @@ def _make(graph: FloorGraph) -> MapArrays:
         stairs=kinds == "stairs", lifts=kinds == "lift", ports=ports,
         port_number={port: k for k, port in enumerate(ports)}, port_object=port_object, port_end=port_end,
         port_node=port_node, area_port=2 * L + np.cumsum([0, *counts[:-1]], dtype=np.intp)[:A],
-        borders=tuple(border(a.polygon) for a in graph.areas.values()), doors=doors, inward=inward, door=door,
+        borders=together([border(a.polygon) for a in graph.areas.values()]), doors=doors, inward=inward, door=door,
     )
 
 

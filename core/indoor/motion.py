@@ -50,9 +50,9 @@ def advance(graph: FloorGraph, cloud: Cloud, dt_s: float, walk: Walk, rng: np.ra
     w = Walkers.of(cloud, dt_s, graph, walk, rng)
     if dt_s > 0.0:
         _vary(w, dt_s)
-        _wait(w, np.flatnonzero(w.wait > 0.0))
+        _wait(w, (w.wait > 0.0).nonzero()[0])
         in_area = w.object >= maps.n_links
-        links, areas = np.flatnonzero(~in_area), np.flatnonzero(in_area)
+        links, areas = (~in_area).nonzero()[0], in_area.nonzero()[0]
         while links.size or areas.size:
             at_node, ports = _along_links(w, links)
             new = choose(w, at_node, ports)
@@ -79,11 +79,11 @@ def _vary(w: Walkers, dt: float) -> None:
         w.speed[goes] = np.clip(rng.uniform(*walk.start_speeds_mps, goes.size), walk.v_min_mps, walk.v_max_mps)
         w.speed[w.stopped] = 0.0
     if walk.turn_rate_hz:
-        turns = np.flatnonzero(rng.random(N) < chance(walk.turn_rate_hz, dt))
+        turns = (rng.random(N) < chance(walk.turn_rate_hz, dt)).nonzero()[0]
         turns = turns[~w.maps.lifts[w.object[turns]]]     # nobody turns a lift round
         w.direction[turns] *= -1.0
-    if w.maps.borders and walk.sigma_heading_rad:
-        inside = np.flatnonzero(w.object >= w.maps.n_links)
+    if len(w.maps.doors) and walk.sigma_heading_rad:
+        inside = (w.object >= w.maps.n_links).nonzero()[0]
         w.heading[inside] += walk.sigma_heading_rad * math.sqrt(dt) * rng.standard_normal(inside.size)
 
 
@@ -100,7 +100,7 @@ def _along_links(w: Walkers, i: Numbers) -> tuple[Numbers, Numbers]:
     rate, L = w.rate(i, o), w.maps.length[o]
     target = x + d * rate * w.left[i]
     w.offset[i] = np.clip(target, 0.0, L)
-    over = np.flatnonzero((target < 0.0) | (target > L))
+    over = ((target < 0.0) | (target > L)).nonzero()[0]
     done = i[over]
     to_end = np.where(d[over] > 0.0, L[over] - x[over], x[over])
     left = w.left[done] - to_end / rate[over]

@@ -50,7 +50,7 @@ class Walkers:
             c.object.copy(), c.offset_m.copy(), c.direction.copy(), np.array(c.position_m.T, order="C").T,
             c.heading_rad.copy(), c.speed_mps.copy(), c.stopped.copy(), c.wait_s.copy(), c.goal.copy(), c.held.copy(),
             np.full(N, float(dt_s)), maps, clearance(graph), choice_table(graph, walk.rule, walk.l_max_m, walk.u_turn),
-            walk, rng, bool((maps.stairs | maps.lifts).any()), np.zeros(N if maps.borders else 0, np.intp),
+            walk, rng, bool((maps.stairs | maps.lifts).any()), np.zeros(N if len(maps.doors) else 0, np.intp),
         )
 
     def rate(self, i: Numbers, o: Numbers) -> Array:

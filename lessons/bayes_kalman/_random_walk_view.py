@@ -49,8 +49,8 @@ def _equations(r: "Result", at: Moment) -> list[Equation]:
                       ("=", t.steps.prior.mean[i, :2], r",\quad \sqrt{P_{ii}^-} =",
                        np.sqrt(t.steps.prior.cov[i, [0, 1], [0, 1]]))))
     for name, t in pair:
-        lines.append((f"gain_{name}", GAIN, r"K_k = P_k^-H^TS_k^{-1},\quad [K_{11},\;K_{22}]^T",
-                      ("=", t.steps.gain[i, [0, 1], [0, 1]], r",\quad \tilde{\mathbf{y}}_k =", t.steps.innovation[i])))
+        lines.append((f"gain_{name}", GAIN, r"K_k = P_k^-H^TS_k^{-1},\; K_{ii}",
+                      ("=", t.steps.gain[i, [0, 1], [0, 1]], r",\; \tilde{\mathbf{y}}_k =", t.steps.innovation[i])))
     for name, t in pair:
         lines.append((f"update_{name}", UPDATE, r"\hat{\mathbf{x}}_k = \hat{\mathbf{x}}_k^- + K_k\tilde{\mathbf{y}}_k,"
                       r"\quad \mathbf{p}", ("=", t.steps.posterior.mean[i, :2], r",\quad \sqrt{P_{ii}} =",

@@ -26,15 +26,15 @@ def view(p: "Params", r: "Result", at: Moment) -> View:
     """Everything up to this step, and of this step everything up to this stage."""
     return View(
         scene=_scene(r, at), camera=_camera(p, r), figures=_figures(p, r, at.step), readouts=_readouts(r, at.step),
-        equations=_equations(r, at), caption=f"t = {at.step} s", note=_note(p, r),
+        equations=_equations(r, at), caption=f"t = {at.step} s", note=_note(r),
     )
 
 
-def _note(p: "Params", r: "Result") -> str:
+def _note(r: "Result") -> str:
     """When the grid, the reference here, should not be trusted."""
-    if r.exact.cell_m > 0.85 * p.sigma_m:
+    if r.exact.cell_m > r.sigma_m:
         return (f"The grid is coarse here: its cells of {r.exact.cell_m:.2g} m must show a measurement of "
-                f"σ = {p.sigma_m:g} m.")
+                f"σ = {r.sigma_m:g} m.")
     if r.exact.lost > 0.02:
         return f"The moving grid cut off {r.exact.lost:.1%} of the probability in all."
     return ""
@@ -66,22 +66,22 @@ def _scene(r: "Result", at: Moment) -> list[Item]:
         items += [Polyline(f"range_{j + 1}", s + distance * np.column_stack([np.cos(CIRCLE), np.sin(CIRCLE)]),
                            role="measurement", width=2.5)
                   for j, (s, distance) in enumerate(zip(r.stations, r.y[i], strict=True))]
-    if stage < UPDATE:
-        same = k == 1
+    same = k == 1
+    if stage < UPDATE or same:
         items.append(LevelEllipse("prior" if same else "ekf_prior", _law(r.ekf.prior, i),
-                                  role="prior" if same else "ekf", width=3, dashed=not same))
+                                  role="prior" if same else "ekf", width=3 if stage < UPDATE else 1.5, dashed=not same))
         if not same:
             items.append(LevelEllipse("ukf_prior", _law(r.ukf.prior, i), role="ukf", width=3, dashed=True))
     if stage >= LINEARISE:
         ekf, ukf = _lines(r, i)
-        items += [Segments("ekf_lines", ekf, role="ekf", width=2.0, fade=0.3),
-                  Segments("ukf_lines", ukf, role="ukf", width=2.0, fade=0.3)]
+        items += [Segments("ekf_lines", ekf, role="ekf", width=2.5),
+                  Segments("ukf_lines", ukf, role="ukf", width=2.5)]
     if stage == LINEARISE:
         items.append(Points("sigma", r.ukf.points[i, :, :2], role="sigma", size=9))
     if stage == UPDATE:
         items += [LevelEllipse("grid_now", _law(r.exact.law, k), role="grid", width=3),
-                  LevelEllipse("ukf_now", _law(r.ukf.posterior, i), role="ukf", width=4),
-                  LevelEllipse("ekf_now", _law(r.ekf.posterior, i), role="ekf", width=4)]
+                  LevelEllipse("ukf_now", _law(r.ukf.posterior, i), role="ukf", width=4, filled=True),
+                  LevelEllipse("ekf_now", _law(r.ekf.posterior, i), role="ekf", width=4, filled=True)]
     return items
 
 
@@ -97,8 +97,8 @@ def _lines(r: "Result", i: int) -> tuple[Array, Array]:
 
 
 def _through(A: Array, nu: Array, prior: Gaussian) -> Array:
-    """{x: A_j (x - x_bar) = nu_j} for each row j, 2.2 standard deviations of the prior to each side."""
-    length = 2.2 * float(np.sqrt(np.trace(prior.cov) / 2.0))
+    """{x: A_j (x - x_bar) = nu_j} for each row j, 1.5 standard deviations of the prior to each side."""
+    length = 1.5 * float(np.sqrt(np.trace(prior.cov) / 2.0))
     squares = np.maximum(np.square(A).sum(axis=1), 1e-12)[:, None]
     foot = prior.mean + A * nu[:, None] / squares
     along = length * np.column_stack([-A[:, 1], A[:, 0]]) / np.sqrt(squares)

@@ -9,6 +9,7 @@ from core.gaussian import chi_square_level, mahalanobis_squared
 from core.linalg import cholesky_psd
 from core.sensors import Bearing, Range, RangeDifference
 from core.types import Array, Gaussian, Sensor
+from lessons.kit.lesson import Progress
 
 if TYPE_CHECKING:
     from lessons.filtering.extended import Params
@@ -34,6 +35,11 @@ def sensor_of(p: "Params") -> Sensor:
             return RangeDifference([p.station_1, p.station_2], p.sigma_m)
         case _:
             return Range([p.station_1, p.station_2], p.sigma_m)
+
+
+def measured(sensor: Sensor, truth: Array, error: float) -> Array:
+    """h(truth) + error sigma."""
+    return sensor.h(truth) + error * np.sqrt(np.diagonal(sensor.R))
 
 
 def exact_posterior(prior: Gaussian, y: Array, sensor: Sensor, cells: int, coarse: int = 80) -> grid.GridDensity:
@@ -87,12 +93,33 @@ def most_bent(prior: Gaussian, sensor: Sensor, x: Array) -> Array:
     return u if u[0] + 1e-9 * u[1] >= 0 else -u
 
 
-def shares_by_spread(prior: Gaussian, y: Array, sensor: Sensor, factors: Array, iterations: int) -> Array:
-    """share_inside of the EKF's and the iterated filter's ellipse when the prior's sigmas are multiplied, (k, 2)."""
-    found = []
-    for c in factors:
+def picture_box(p: "Params", prior: Gaussian, exact: grid.GridDensity, first: Array) -> Array:
+    """Corners (2, 2) of what must be visible; `first` is the EKF's estimate."""
+    reach = 2.1 * np.sqrt(np.diagonal(prior.cov))
+    law = grid.moments(exact)
+    spread = 2.2 * np.sqrt(np.diagonal(law.cov))
+    parts = [prior.mean - reach, prior.mean + reach, law.mean - spread, law.mean + spread,
+             np.clip(first, prior.mean - 1.5 * reach, prior.mean + 1.5 * reach)]
+    if p.zoom == "all":
+        parts += [np.array(p.truth), np.array(p.station_1)]
+        parts += [np.array(p.station_2)] if p.sensor in ("difference", "two_ranges") else []
+    low, high = np.min(parts, axis=0), np.max(parts, axis=0)
+    margin = 0.08 * float((high - low).max())
+    return np.array([low - margin, high + margin])
+
+
+def shares_by_spread(p: "Params", factors: Array, iterations: int, progress: Progress) -> Array:
+    """share_inside of the EKF's and the iterated filter's ellipse, (k, 2), for narrower and wider priors.
+
+    The prior's sigmas and the truth's distance from its mean are multiplied together, so that the truth stays as
+    likely as it is.
+    """
+    sensor, prior, found = sensor_of(p), prior_of(p), []
+    for i, c in enumerate(factors):
+        progress(0.2 + 0.7 * i / len(factors))
         wider = Gaussian(prior.mean, c**2 * prior.cov)
+        y = measured(sensor, prior.mean + c * (np.array(p.truth) - prior.mean), p.error)
         exact = exact_posterior(wider, y, sensor, 100, 60)
         steps = extended.iterate(wider, y, sensor, iterations)
-        found.append([share_inside(steps[i].posterior, exact) for i in (0, -1)])
+        found.append([share_inside(step.posterior, exact) for step in (steps[0], steps[-1])])
     return np.array(found)

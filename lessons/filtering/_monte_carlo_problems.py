@@ -14,6 +14,7 @@ if TYPE_CHECKING:
     from lessons.filtering.monte_carlo import Params
 
 SMALLEST = 0.2                           # side of the rectangle
+WIDTHS = np.geomspace(0.3, 5.0, 60)       # of proposals that are compared
 NODES, NODE_WEIGHTS = np.polynomial.legendre.leggauss(200)
 
 
@@ -30,9 +31,11 @@ def target(p: "Params", z: Array) -> Array:
     """g(z) for z (..., d): the parabola, or the normal density on the rectangle, which is not normalised."""
     if p.problem == "parabola":
         return 0.75 * np.maximum(1.0 - np.square(z[..., 0]), 0.0)
-    low, high = box(p).T
-    inside = ((z >= low) & (z <= high)).all(axis=-1)
-    return inside * np.exp(-0.5 * np.square(z).sum(axis=-1)) / (2.0 * np.pi)
+    total = np.exp(-0.5 * (np.square(z[..., 0]) + np.square(z[..., 1]))) / (2.0 * np.pi)
+    for i, (low, high) in enumerate(box(p)):
+        total *= z[..., i] >= low
+        total *= z[..., i] <= high
+    return total
 
 
 def support(p: "Params") -> Array:
@@ -46,23 +49,28 @@ def support(p: "Params") -> Array:
 
 
 def sample(p: "Params", size: tuple[int, ...], rng: np.random.Generator) -> Array:
-    """Independent draws from f, (*size, d)."""
+    """Independent draws from f, (*size, d), each component contiguous."""
     from scipy.special import ndtr, ndtri
 
-    low, high = support(p).T
-    d = len(low)
-    if p.proposal == "normal":
-        return p.centre + p.width * rng.standard_normal((*size, d))
-    if p.proposal == "uniform":
-        return rng.uniform(low, high, (*size, d))
-    if p.problem == "parabola":
-        return 2.0 * rng.beta(2.0, 2.0, (*size, d)) - 1.0
-    return np.clip(ndtri(rng.uniform(ndtr(low), ndtr(high), (*size, d))), low, high)
+    def axis(low: float, high: float) -> Array:
+        if p.proposal == "normal":
+            return p.centre + p.width * rng.standard_normal(size)
+        if p.proposal == "uniform":
+            return rng.uniform(low, high, size)
+        if p.problem == "parabola":
+            a, b, c = rng.uniform(-1.0, 1.0, (3, *size))      # the middle of three has this density
+            return np.maximum(np.minimum(a, b), np.minimum(np.maximum(a, b), c))
+        return np.clip(ndtri(rng.uniform(ndtr(low), ndtr(high), size)), low, high)
+
+    return np.moveaxis(np.array([axis(*ends) for ends in support(p)]), 0, -1)
 
 
 def density(p: "Params", z: Array) -> Array:
     """f(z) for z (..., d)."""
-    return np.prod([axis_density(p, i, z[..., i]) for i in range(z.shape[-1])], axis=0)
+    found = axis_density(p, 0, z[..., 0])
+    for i in range(1, z.shape[-1]):
+        found = found * axis_density(p, i, z[..., i])
+    return found
 
 
 def axis_density(p: "Params", axis: int, z: Array, width: float | None = None) -> Array:

@@ -59,7 +59,7 @@ def _curves(p: "Params", r: "Result", at: Moment, n: int) -> tuple[list[Item], P
     roof = float(np.clip(1.15 * np.nanmax(np.where(np.isfinite(ratio), ratio, 0.0)), 1.6, 6.0))
     size = np.array([6.4, 2.5])
     below = Panel(np.array([-3.2, 0.0]), np.array([3.2, tall]), np.array([-3.2, 0.0]), size)
-    above = Panel(np.array([-3.2, 0.0]), np.array([3.2, roof]), np.array([-3.2, 3.5]), size)
+    above = Panel(np.array([-3.2, 0.0]), np.array([3.2, roof]), np.array([-3.2, 3.95]), size)
 
     items: list[Item] = [
         *below.axes("below", ("integrand and density", "z", "g, f"), PIXEL),
@@ -90,7 +90,7 @@ def _curves(p: "Params", r: "Result", at: Moment, n: int) -> tuple[list[Item], P
                                  role="posterior", opacity=0.3))
         items.append(Polyline("mean", above.place(np.array([[-3.2, min(mean, roof)], [3.2, min(mean, roof)]])),
                               role="posterior", width=3.0))
-    return items, Plane((-3.9, 3.4), (-0.65, 6.75), axes=False)
+    return items, Plane((-3.9, 3.4), (-0.65, 7.2), axes=False)
 
 
 def _square(p: "Params", r: "Result", at: Moment, n: int) -> tuple[list[Item], Plane]:
@@ -137,14 +137,17 @@ def _equations(p: "Params", r: "Result", at: Moment, n: int) -> list[Equation]:
         lines += [
             ("mean", AVERAGE, r"\bar{h}_n = \frac{1}{n}\sum_i h(z_i)", ("=", float(mean[0]))),
             ("variance", AVERAGE, r"V(\bar{h}_n) \approx \frac{1}{n^2}\sum_i (h(z_i) - \bar{h}_n)^2",
-             ("=", float(sd[0]**2))),
-            ("left_out", AVERAGE, r"\frac{1}{n^2}\sum_{h(z_i) > 0} (h(z_i) - \bar{h}_n)^2", ("=", left_out)),
+             ("=", 1e5 * float(sd[0]**2), r"\cdot 10^{-5}")),
+            ("left_out", AVERAGE, r"\frac{1}{n^2}\sum_{h(z_i) > 0} (h(z_i) - \bar{h}_n)^2",
+             ("=", 1e5 * left_out, r"\cdot 10^{-5}")),
         ]
     else:
         known = np.isfinite(mean).all()
         lines += [
-            ("ratio", AVERAGE, r"\hat{\mathbf{x}} = \sum_i h_i\mathbf{z}_i \,/ \sum_i h_i", ("=", mean) if known else ()),
-            ("ratio_sd", AVERAGE, r"\sigma^2 \approx \sum_i h_i^2(\mathbf{z}_i - \hat{\mathbf{x}})^2 \,/ (\sum_i h_i)^2",
+            ("ratio", AVERAGE, r"\hat{\mathbf{x}} = \sum_i h_i\mathbf{z}_i \,/ \sum_i h_i",
+             ("=", mean) if known else ()),
+            ("ratio_sd", AVERAGE,
+             r"\sigma^2 \approx \sum_i h_i^2(\mathbf{z}_i - \hat{\mathbf{x}})^2 \,/ (\sum_i h_i)^2",
              (r",\quad \sigma =", sd) if known else ()),
         ]
     return [Equation(name, (rule, *numbers) if stage <= at.stage else (rule,), current=stage == at.stage)
@@ -184,9 +187,7 @@ def _figures(p: "Params", r: "Result", n: int) -> dict[str, "go.Figure"]:
     known = np.isfinite(r.running[:, 0])
     counts, mean, sd = r.counts[known], r.running[known, 0], r.running_sd[known, 0]
     theory = np.sqrt(r.term_variance / r.counts)
-    from lessons.filtering.monte_carlo import WIDTHS
-
-    sweep = fig.chart(fig.line("variance", WIDTHS, np.maximum(r.sweep, FLOOR), "prior"),
+    sweep = fig.chart(fig.line("variance", problems.WIDTHS, np.maximum(r.sweep, FLOOR), "prior"),
                       fig.markers("here", [p.width], [max(r.term_variance, FLOOR)], "warning", size=11),
                       log_x=True, log_y=True, y_range=_sweep_range(r))
     return {

@@ -177,7 +177,8 @@ def _copies(r: "Result", at: Moment) -> list[Item]:
 
 def _equations(p: "Params", r: "Result", at: Moment) -> list[Equation]:
     """Algorithm 6 with the numbers of point i."""
-    start = Equation("sum", (r"\omega =", r.w[None], r",\quad c =", np.cumsum(r.w)[None]), current=at.step == 0, digits=3)
+    start = Equation("sum", (r"\omega =", r.w[None], r",\quad c =", np.cumsum(r.w)[None]),
+                     current=at.step == 0, digits=3)
     if at.step == 0:
         return [start]
     i = at.step - 1
@@ -204,8 +205,9 @@ def _equations(p: "Params", r: "Result", at: Moment) -> list[Equation]:
             return i < outright and at.stage < COPY
         return stage == at.stage
 
-    return [start, *(Equation(name, (rule, *numbers) if stage <= at.stage else (rule,), current=running(name, stage),
-                              digits=1 if name in ("outright", "copies") else 3) for name, stage, rule, numbers in lines)]
+    return [start, *(
+        Equation(name, (rule, *numbers) if stage <= at.stage else (rule,), current=running(name, stage),
+                 digits=1 if name in ("outright", "copies") else 3) for name, stage, rule, numbers in lines)]
 
 
 def _readouts(p: "Params", r: "Result") -> list[Readout]:
@@ -234,7 +236,8 @@ def _figures(p: "Params", r: "Result") -> dict[str, "go.Figure"]:
         "watched": fig.chart(*(fig.bars(name, shown, 100.0 * r.many.shares[s][shown], ROLES[name])
                                for s, name in enumerate(SCHEMES)), marks=[float(p.n * r.w[r.watched])]),
         "variance": fig.chart(*(fig.bars(name, j, r.many.variance[s], ROLES[name]) for s, name in enumerate(SCHEMES)),
-                              fig.markers("theory", j, multinomial, "reference", size=9, symbol="diamond"), categories=True),
+                              fig.markers("theory", j, multinomial, "reference", size=9, symbol="diamond"),
+                              categories=True),
         "mean": fig.chart(*(fig.bars(name, [s + 1], [float(r.many.mean_sd[s])], ROLES[name], width=0.7)
                             for s, name in enumerate(SCHEMES)), x_range=(0.4, 4.6)),
     }

@@ -20,7 +20,10 @@ from lessons.kit.params import Point, choice, draggable, seed, slider
 
 STEPS = 20
 RUNS = 200                               # draws behind the mean NEES; the first one is shown
-VELOCITY = (3.0, 3.0)                    # m/s, mean of the start in the velocity model: Example 22
+START_22 = Gaussian(np.array([-150.0, -30.0, 3.0, 3.0]), np.diag([20.0, 20.0, 5.0, 5.0])**2)
+STATIONS_22 = np.array([[-250.0, 0.0], [250.0, 0.0]])
+SIGMA_22 = 10.0                          # m, of a range
+COUNTS_22 = (16, 48, 12, 16)             # most cells across the line of the stations, where two peaks come
 GIVEN = (118.0, 390.0)                   # m, the first ranges of the worked update
 KAPPAS = np.linspace(-1.8, 8.0, 50)
 FINE = 160                               # cells per axis of the exact first update
@@ -28,9 +31,9 @@ FINE = 160                               # cells per axis of the exact first upd
 
 @dataclass(frozen=True, slots=True)
 class Params:
-    """Geometry and noise; every filter knows them."""
+    """Geometry and noise, known to every filter; Example 22 brings its own."""
 
-    model: str = choice("walk", ("walk", "velocity"), group="world")
+    world: str = choice("walk", ("walk", "example_22"), group="world")
     stations: int = slider(2, low=1, high=3, group="world")
     start_sigma_m: float = slider(35.0, low=5.0, high=60.0, step=1.0, unit="m", group="world")
     sigma_m: float = slider(5.0, low=3.0, high=30.0, step=0.5, unit="m", group="world")
@@ -41,11 +44,9 @@ class Params:
     station_2: Point = draggable((120.0, 0.0), low=-400.0, high=400.0, role="station", group="more")
     station_3: Point = draggable((60.0, 130.0), low=-400.0, high=400.0, role="station", group="more")
     sigma_walk: float = slider(5.0, low=0.5, high=20.0, step=0.5, unit="m/√s", group="more")
-    sigma_c: float = slider(1.0, low=0.1, high=5.0, step=0.1, unit="m/s/√s", group="more")
-    start_sigma_mps: float = slider(5.0, low=1.0, high=8.0, step=0.5, unit="m/s", group="more")
-    truth: str = choice("drawn", ("drawn", "straight"), group="more")
+    truth: str = choice("straight", ("straight", "drawn"), group="more")
     first: str = choice("drawn", ("drawn", "given"), group="more")
-    zoom: str = choice("stations", ("stations", "track"), group="view")
+    zoom: str = choice("track", ("track", "stations"), group="view")
 
 
 class Exact(NamedTuple):
@@ -72,6 +73,7 @@ class Result(NamedTuple):
     """Three filters on the same draw, and how honest they are over many."""
 
     stations: Array              # (s, 2)
+    sigma_m: float               # of a range
     truth: Array                 # (STEPS + 1, n)
     y: Array                     # (STEPS, s)
     initial: Gaussian
@@ -88,19 +90,18 @@ class Result(NamedTuple):
 def compute(p: Params, progress: Progress) -> Result:
     """Draws RUNS tracks and measurements, filters all of them, and the first also on a grid."""
     begin, move, measure = np.random.default_rng(p.seed).spawn(3)
-    stations = np.array([p.station_1, p.station_2, p.station_3])[:p.stations]
-    motion, sensor = motion_of(p), Range(stations, p.sigma_m)
-    initial = start_of(p)
+    initial, motion, sensor = model(p)
     truth = np.empty((STEPS + 1, RUNS, len(initial.mean)))
     truth[0] = sample(initial, RUNS, begin)
     for k in range(STEPS):
         truth[k + 1] = motion.sample(truth[k], move)
-    if straight(p):
+    if p.world == "example_22" and p.truth == "straight":
         truth[:, 0] = initial.mean
         truth[:, 0, :2] += np.arange(STEPS + 1)[:, None] * initial.mean[2:]
     # Three columns always, so that another station changes neither the track nor the other ranges' errors.
-    y = sensor.h(truth[1:]) + p.sigma_m * measure.standard_normal((STEPS, RUNS, 3))[..., :p.stations]
-    if given(p):
+    noise = measure.standard_normal((STEPS, RUNS, 3))[..., :len(sensor.R)]
+    y = sensor.h(truth[1:]) + np.sqrt(np.diagonal(sensor.R)) * noise
+    if p.world == "example_22" and p.first == "given":
         y[0, 0] = GIVEN
 
     every = [extended.run(initial, y, motion, sensor).posterior,
@@ -111,34 +112,22 @@ def compute(p: Params, progress: Progress) -> Result:
     exact = on_grid(p, initial, y[:, 0], motion, sensor, lambda done: progress(0.1 + 0.7 * done))
     laws = [position(ekf.posterior), position(ukf.posterior),
             Gaussian(exact.law.mean[1:], exact.law.cov[1:])]
-    first = first_update(p, ekf.prior, every, y[0], truth[1], sensor, progress)
+    first = first_update(ekf.prior, every, y[0], truth[1], sensor, progress)
     return Result(
-        stations, truth[:, 0], y[:, 0], initial, ekf, ukf, exact, first,
+        sensor.stations_m, float(np.sqrt(sensor.R[0, 0])), truth[:, 0], y[:, 0], initial, ekf, ukf, exact, first,
         np.array([np.sqrt(np.square(g.mean - truth[1:, 0, :2]).sum(axis=-1)) for g in laws]),
         np.array([metrics.nees(g, truth[1:, 0, :2]) for g in laws]),
         np.array([metrics.nees(position(g), truth[1:, :, :2]).mean(axis=1) for g in every]),
         metrics.consistency_band(0.95, 2, RUNS))
 
 
-def motion_of(p: Params) -> LinearMotion:
-    return constant_position(1.0, p.sigma_walk, 2) if p.model == "walk" else constant_velocity(1.0, p.sigma_c, 2)
-
-
-def start_of(p: Params) -> Gaussian:
-    """What is known at t = 0, without any measurement."""
-    if p.model == "walk":
-        return Gaussian(np.array(p.start), p.start_sigma_m**2 * np.eye(2))
-    sigma = np.repeat([p.start_sigma_m, p.start_sigma_mps], 2)
-    return Gaussian(np.array([*p.start, *VELOCITY]), np.diag(sigma**2))
-
-
-def straight(p: Params) -> bool:
-    """Is the shown track the mean of the start, moved on without noise?"""
-    return p.model == "velocity" and p.truth == "straight"
-
-
-def given(p: Params) -> bool:
-    return p.first == "given" and p.stations == 2
+def model(p: Params) -> tuple[Gaussian, LinearMotion, Range]:
+    """What is known at t = 0 s without any measurement, how the state moves in 1 s, and the sensor."""
+    if p.world == "example_22":
+        return START_22, constant_velocity(1.0, 1.0, 2), Range(STATIONS_22, SIGMA_22)
+    stations = np.array([p.station_1, p.station_2, p.station_3])[:p.stations]
+    start = Gaussian(np.array(p.start), p.start_sigma_m**2 * np.eye(2))
+    return start, constant_position(1.0, p.sigma_walk, 2), Range(stations, p.sigma_m)
 
 
 def position(g: Gaussian) -> Gaussian:
@@ -147,24 +136,16 @@ def position(g: Gaussian) -> Gaussian:
 
 
 def counts(p: Params) -> tuple[int, ...]:
-    """Cells per axis: a standard deviation of the ranges is at least 1.2 cells, as long as the work allows it.
-
-    With velocities the grid has four axes.  Most cells go across the line of the stations, where there may be two
-    peaks.
-    """
-    if p.model == "walk":
-        n = int(np.clip(12.0 * p.start_sigma_m / p.sigma_m, 60, 200))
-        return n, n
-    least = int(np.clip(8.0 * p.start_sigma_m / p.sigma_m, 16, 28))
-    along = np.abs(np.subtract(p.station_2, p.station_1))
-    across = along[::-1] / max(float(np.linalg.norm(along)), 1e-9) if p.stations == 2 else np.full(2, 0.5)
-    n, m = (round(least + (48 - least) * float(share)) for share in across)
-    return (n, m, 12, 16) if m >= n else (n, m, 16, 12)
+    """Cells per axis: where the grid is widest, a cell is still smaller than a standard deviation of the ranges."""
+    if p.world == "example_22":
+        return COUNTS_22
+    n = int(np.clip(16.0 * p.start_sigma_m / p.sigma_m, 60, 200))
+    return n, n
 
 
 def on_grid(p: Params, initial: Gaussian, y: Array, motion: LinearMotion, sensor: Range, progress: Progress) -> Exact:
     """The point-mass filter on a grid that follows the density."""
-    shape, width = counts(p), 5.0 if p.model == "walk" else 4.0
+    shape, width = counts(p), 5.0 if len(initial.mean) == 2 else 4.0
     density = grid.from_gaussian(initial, grid.gaussian_axes(initial, shape, width))
     start = grid.marginal(density, (0, 1))
     axes, before, after, laws, lost, cell = [start.axes], [start.weights], [start.weights], [position(initial)], 0.0, 0.0
@@ -186,7 +167,7 @@ def on_grid(p: Params, initial: Gaussian, y: Array, motion: LinearMotion, sensor
 
 
 def first_update(
-    p: Params, prior: Gaussian, every: list[Gaussian], y: Array, truth: Array, sensor: Range, progress: Progress
+    prior: Gaussian, every: list[Gaussian], y: Array, truth: Array, sensor: Range, progress: Progress
 ) -> First:
     """Step 1 on a fine grid of positions, which is exact: the ranges do not depend on the velocity.
 
@@ -211,21 +192,16 @@ def _distance(g: Gaussian, exact: Gaussian) -> Array:
 
 
 def unused(p: Params) -> tuple[str, ...]:
-    """Parameters of the other model, stations that are not there, and what needs two stations."""
-    found = ["sigma_c", "start_sigma_mps", "truth"] if p.model == "walk" else ["sigma_walk"]
-    found += [f"station_{i}" for i in range(p.stations + 1, 4)]
-    return tuple(found + ([] if p.stations == 2 else ["first"]))
+    """What the other world needs, and stations that are not there."""
+    if p.world == "example_22":
+        return ("stations", "start_sigma_m", "sigma_m", "start", "station_1", "station_2", "station_3", "sigma_walk")
+    return ("truth", "first", *(f"station_{i}" for i in range(p.stations + 1, 4)))
 
 
 def timeline(p: Params) -> Timeline:
     """Step 1, where all three start from the same prior, is shown first."""
     return Timeline(STEPS, ("predict", "measure", "linearise", "update"), start=1, unit="s")
 
-
-EXAMPLE_22 = {
-    "model": "velocity", "start": (-150.0, -30.0), "station_1": (-250.0, 0.0), "station_2": (250.0, 0.0),
-    "start_sigma_m": 20.0, "sigma_m": 10.0, "kappa": -1.0, "truth": "straight",
-}
 
 LESSON = Lesson(
     Params, compute, view, timeline=timeline, unused=unused, budget_s=3.0,
@@ -236,7 +212,7 @@ LESSON = Lesson(
         "one station": {"stations": 1},
         "three stations": {"stations": 3, "step": STEPS},
         "far away": {"start": (90.0, 260.0), "start_sigma_m": 20.0, "sigma_m": 10.0},
-        "Example 22, y₁ = [118, 390]": {**EXAMPLE_22, "first": "given", "zoom": "track"},
-        "Example 22, the track": {**EXAMPLE_22, "seed": 2681, "step": STEPS},
+        "Example 22, y₁ = [118, 390]": {"world": "example_22", "kappa": -1.0, "first": "given"},
+        "Example 22, the track": {"world": "example_22", "kappa": -1.0, "seed": 2681, "step": STEPS},
     },
 )

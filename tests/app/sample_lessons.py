@@ -27,7 +27,7 @@ COMPUTED = []
 
 def compute(p, progress):
     COMPUTED.append(p)
-    x = np.linspace(0.0, 6.0, 25)
+    x = np.linspace(0.0, 6.0, 61)
     return np.column_stack([x, p.amplitude * np.sin(x + 0.1 * p.seed)])
 
 def view(p, wave, at):

@@ -8,7 +8,7 @@ from tests.browser.visit import Visit, difference
 
 
 def test_slider_by_keyboard_changes_numbers_plot_and_picture(visit: Visit) -> None:
-    visit.open("lesson=filtering.kalman")
+    visit.open("lesson=filtering.kalman", drawn=False)
     before, numbers = visit.canvas(), visit.readouts()
     plot = visit.plot()
     slider = visit.slider("σ x (m)")
@@ -26,7 +26,7 @@ def test_slider_by_keyboard_changes_numbers_plot_and_picture(visit: Visit) -> No
 
 
 def test_slider_by_mouse_changes_plot_and_picture(visit: Visit) -> None:
-    visit.open("lesson=background.rotation_vector")
+    visit.open("lesson=background.rotation_vector", drawn=False)
     before, plot = visit.canvas(), visit.plot()
     box = visit.slider("Angle").bounding_box()
     assert box is not None
@@ -38,7 +38,7 @@ def test_slider_by_mouse_changes_plot_and_picture(visit: Visit) -> None:
 
 
 def test_preset_button(visit: Visit) -> None:
-    visit.open("lesson=background.rotation_vector")
+    visit.open("lesson=background.rotation_vector", drawn=False)
     before = visit.canvas()
     visit.page.get_by_role("button", name="a half turn").click()
     visit.shows(lambda s: s.params.angle_deg == 180.0, "the preset")
@@ -114,7 +114,7 @@ def test_play_and_pause(visit: Visit) -> None:
 ])
 def test_handle_is_dragged(visit: Visit, lesson: str, point: str) -> None:
     """The point goes where the pointer goes, even when the picture is fitted to it afterwards."""
-    visit.open(f"lesson={lesson}")
+    visit.open(f"lesson={lesson}", drawn=False)
     before, old = visit.canvas(), getattr(visit.scenario.params, point)
     x, y = visit.pixel(_xyz(old))
     expected = visit.scene_point((x + 40, y - 30), _xyz(old))

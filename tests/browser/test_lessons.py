@@ -12,9 +12,9 @@ from tests.browser.visit import Visit, colors
 LESSONS = [entry.id for entry in Registry()]
 
 
-def labels_near(visit: Visit) -> np.ndarray:
+def near_labels(visit: Visit, picture: np.ndarray) -> np.ndarray:
     """The pixels round the texts of the scene, (n, 3)."""
-    picture, view = visit.canvas(), visit.session.view
+    view = visit.session.view
     assert view is not None
     box = visit.canvas_box()
     found = []
@@ -27,15 +27,17 @@ def labels_near(visit: Visit) -> np.ndarray:
 
 @pytest.mark.parametrize("lesson", LESSONS)
 def test_opens_in_light_and_dark(visit: Visit, lesson: str) -> None:
-    visit.open(f"lesson={lesson}")
-    light, texts = visit.canvas(), labels_near(visit)
+    visit.open(f"lesson={lesson}", drawn=False)
+    light = visit.canvas()
+    texts = near_labels(visit, light)
     assert colors(light) > 100 and (light != 255).any(axis=-1).mean() > 0.01
     assert (np.median(light.reshape(-1, 3), axis=0) > 250).all()
     assert (texts.max(axis=1) < 90).mean() > 0.005, "dark text"
 
     visit.page.keyboard.press("t")
     visit.shows(lambda s: s.theme == "dark", "the dark theme")
-    dark, texts = visit.canvas(), labels_near(visit)
+    dark = visit.canvas()
+    texts = near_labels(visit, dark)
     assert visit.page.evaluate("window.paikka.labels.dark && window.paikka.labels.patched > 0")
     assert colors(dark) > 100
     assert (np.median(dark.reshape(-1, 3), axis=0) < 40).all()
@@ -72,9 +74,9 @@ def test_text_formulas_and_names(visit: Visit, lesson: str) -> None:
     assert len(set(names)) == len(names) and set(names) <= set(shown), names
 
 
-@pytest.mark.parametrize("lesson, control", [("background.rotation_vector", "Angle"), ("filtering.kalman", "σ x")])
+@pytest.mark.parametrize("lesson, control", [("background.rotation_vector", "Angle"), ("filtering.kalman", "σ x (m)")])
 def test_on_a_phone(new_visit, lesson: str, control: str) -> None:
-    visit = new_visit(width=390, height=844).open(f"lesson={lesson}")
+    visit = new_visit(width=390, height=844).open(f"lesson={lesson}", drawn=False)
     before = visit.canvas()
     assert colors(before) > 100
     slider = visit.slider(control)

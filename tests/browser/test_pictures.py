@@ -53,7 +53,7 @@ def test_save_picture(visit: Visit, lesson: str) -> None:
         coloured[name] = ink(pixels)
         assert coloured[name] > 0.005
     small, large = coloured.values()
-    assert large == pytest.approx(small, rel=0.2)
+    assert large == pytest.approx(small, rel=0.05)  # a quarter is lost where lines do not grow
 
     clear = saved_picture(visit, "1920 × 1080", "transparent")
     assert clear.size == (1920, 1080) and clear.mode == "RGBA"

@@ -80,9 +80,9 @@ def test_a_graph_cannot_be_changed_and_leaves_its_source_alone():
 
 
 def test_unknown_ids_are_named():
-    with pytest.raises(ValueError, match="node_id.*'zz'"):
+    with pytest.raises(ValueError, match=r"node_id.*'zz'"):
         M0.objects_at("zz")
-    with pytest.raises(ValueError, match="object_id.*'zz'"):
+    with pytest.raises(ValueError, match=r"object_id.*'zz'"):
         M0.length("zz")
     with pytest.raises(ValueError, match="node_id"):
         M0.objects_at(["n1"])
@@ -90,10 +90,12 @@ def test_unknown_ids_are_named():
 
 WRONG = {
     "dangling node": (line(links={"l": ["a", "zz"]}), ["link 'l'", "'zz'"]),
-    "zero length": ({"nodes": {"a": [1, 2], "b": [1, 2]}, "links": {"l": ["a", "b"]}}, ["link 'l'", "length", "one node"]),
+    "zero length": ({"nodes": {"a": [1, 2], "b": [1, 2]}, "links": {"l": ["a", "b"]}},
+                    ["link 'l'", "length", "one node"]),
     "loop": (line(links={"l": ["a", "a"]}), ["link 'l'", "two different nodes"]),
     "one node": (line(links={"l": ["a"]}), ["link 'l'", "two node ids"]),
-    "not finite": ({"nodes": {"a": [0, float("nan")], "b": [1, 0]}, "links": {"l": ["a", "b"]}}, ["node 'a'", "finite"]),
+    "not finite": ({"nodes": {"a": [0, float("nan")], "b": [1, 0]}, "links": {"l": ["a", "b"]}},
+                   ["node 'a'", "finite"]),
     "infinite": ({"nodes": {"a": [0, float("inf")], "b": [1, 0]}, "links": {"l": ["a", "b"]}}, ["node 'a'", "finite"]),
     "text": ({"nodes": {"a": [0, "x"], "b": [1, 0]}, "links": {"l": ["a", "b"]}}, ["node 'a'", "numbers", "'x'"]),
     "truth": ({"nodes": {"a": [0, True], "b": [1, 0]}, "links": {"l": ["a", "b"]}}, ["node 'a'", "numbers"]),
