@@ -187,8 +187,11 @@ def _scenario(registry: Registry, options: argparse.Namespace) -> tuple[Entry, S
 
 
 def _view(entry: Entry, scenario: Scenario) -> View:
-    result = entry.lesson.compute(scenario.params, no_progress)
-    return entry.lesson.view(scenario.params, result, scenario.moment)
+    try:
+        result = entry.lesson.compute(scenario.params, no_progress)
+        return entry.lesson.view(scenario.params, result, scenario.moment)
+    except Exception as error:
+        raise RuntimeError(f"{entry.id} failed: {type(error).__name__}: {error}") from error
 
 
 def _can_open_browser() -> bool:

@@ -13,7 +13,7 @@ from core import checks
 from core.mixture import MixtureUpdate, Rule, advance, check_rule, update
 from core.mixture_law import Components, Mixture, checked, combine, log_sum
 from core.recursion import check_sizes, plan
-from core.stacks import Law, batch_last, empty_stack, law, symmetric
+from core.stacks import Law, batch_last, empty_stack, law
 from core.types import Array, Gaussian, Motion, Sensor
 
 _LARGE = 32                                               # stacks of this size are faster batch last
@@ -65,17 +65,16 @@ def mix(before: Mixture, transition: Array) -> tuple[Array, Mixture]:
     mixed bank.  A model that cannot rule now (c_j = 0) starts from the moments of the whole bank.
     """
     before = checked("before", before)
-    r = before.means.shape[-2]
+    r, n = before.means.shape[-2:]
     log_joint = before.log_weights[..., :, None] + _log_transition(transition, r)
     log_c = log_sum(log_joint, axis=-2)
     possible = log_c > -np.inf
     given = np.exp(log_joint - np.where(possible, log_c, 0.0)[..., None, :])
     mixing = np.where(possible[..., None, :], given, before.weights[..., :, None])
-    x = np.einsum("...ij,...ia->...ja", mixing, before.means)
-    d = before.means[..., :, None, :] - x[..., None, :, :]                # [i, j]: model i seen from start j
-    P = (np.einsum("...ij,...iab->...jab", mixing, before.covs)
-         + np.einsum("...ij,...ija,...ijb->...jab", mixing, d, d, optimize=False))
-    return mixing, Components(log_c - log_sum(log_c)[..., None], x, symmetric(P))
+    x, P = empty_stack(before.means.shape[:-1], n), empty_stack(before.means.shape[:-1], n, n)
+    for j in range(r):
+        x[..., j, :], P[..., j, :, :] = combine(mixing[..., j], before.means, before.covs)
+    return mixing, Components(log_c - log_sum(log_c)[..., None], x, P)
 
 
 def step(

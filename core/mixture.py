@@ -6,7 +6,6 @@ from here.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Literal, NamedTuple
 
 import numpy as np
@@ -222,9 +221,8 @@ def advance(g: Law, motion: Motion, rule: Rule, kappa: float) -> Gaussian:
     return kalman.advance(g, motion) if rule == "ekf" else unscented.advance(g, motion, kappa, "cholesky")[0]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Noisy:
-    """x = f(x) + b + w,  V(w) = Q:  one component of a mixture of noises."""
+class _Noisy(NamedTuple):
+    """x = f(x) + b + w,  V(w) = Q:  a motion with one component of a mixture of noises."""
 
     motion: Motion
     b: Array

@@ -64,6 +64,9 @@ def merge(m: Mixture, below: float, max_components: int | None = None) -> Reduct
     m = checked("m", m)
     check_limits("below", below, max_components)
     *batch, c, n = m.means.shape
+    most = c if max_components is None else max_components
+    if c == 1 or (below == 0.0 and c <= most):
+        return Reduction(m, m, np.where(m.alive, np.broadcast_to(np.arange(c), m.alive.shape), -1), np.zeros(batch))
     w, x, P = m.weights.reshape(-1, c), m.means.reshape(-1, c, n).copy(), m.covs.reshape(-1, c, n, n).copy()
     alive = m.alive.reshape(-1, c).copy()
     owner, lost = np.tile(np.arange(c), (len(w), 1)), np.zeros(len(w))
@@ -71,7 +74,6 @@ def merge(m: Mixture, below: float, max_components: int | None = None) -> Reduct
     cost = np.full((len(w), c, c), np.inf)
     for i in range(c - 1):
         cost[:, i, i + 1:] = _costs(w, x, P, log_det, alive, i)[:, i + 1:]
-    most = c if max_components is None else max_components
     rows = np.arange(len(w))
     while len(rows):
         nearest = cost[rows].reshape(len(rows), -1).argmin(axis=1)

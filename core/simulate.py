@@ -26,7 +26,7 @@ def simulate(
     sensor: Sensor | Sequence[Sensor],
     steps: int,
     runs: int,
-    rng: np.random.Generator,
+    rng: "np.random.Generator",
 ) -> Truth:
     """x_0 ~ initial,  x_k ~ motion | x_{k-1},  y_k = h(x_k) + v,  v ~ N(0, R).
 
@@ -49,7 +49,7 @@ def simulate(
 
 
 def observe(
-    states: Array, sensor: Sensor | Sequence[Sensor], rng: np.random.Generator, runs: int | None = None
+    states: Array, sensor: Sensor | Sequence[Sensor], rng: "np.random.Generator", runs: int | None = None
 ) -> Array:
     """y_k = h(x_k) + v,  v ~ N(0, R), angles wrapped: ys (runs, T, m) for given tracks.
 

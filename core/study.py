@@ -80,7 +80,7 @@ def monte_carlo(
     truth: Truth | None = None,
     steps: int = 60,
     runs: int = 100,
-    rng: np.random.Generator,
+    rng: "np.random.Generator",
     lost_beyond: float,
     entries: Sequence[int] | None = None,
     probabilities: Sequence[float] = (0.68, 0.95),

@@ -29,7 +29,7 @@ class Job(NamedTuple):
     ys: Array
     motion: Motion | Sequence[Motion]
     sensor: Sensor | Sequence[Sensor]
-    rng: np.random.Generator
+    rng: "np.random.Generator"
     progress: Callable[[float], object]
 
 

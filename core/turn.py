@@ -113,7 +113,7 @@ class CoordinatedTurn:
         F[..., 3, 4] = dt * (cos * u - sin * v)
         return F
 
-    def sample(self, x: Array, rng: np.random.Generator) -> Array:
+    def sample(self, x: Array, rng: "np.random.Generator") -> Array:
         """f(x) + L u,  u ~ N(0, I): one draw for each x (..., 5)."""
         x = self.f(x)
         return x + rng.standard_normal(x.shape) @ self.root.T

@@ -21,9 +21,11 @@ log = logging.getLogger(__name__)
 CHAPTERS: dict[str, tuple[str, ...]] = {
     "background": ("rotation_vector",),
     "static": (),
-    "filtering": ("constant_velocity", "kalman", "innovation", "unscented", "nonlinear_compared", "monte_carlo",
-                  "resampling", "particle_vs_ekf"),
-    "bayes_kalman": ("gain", "random_walk"),
+    "filtering": (
+        "constant_velocity", "kalman", "innovation", "extended", "unscented", "nonlinear_compared",
+        "bayes_filter", "monte_carlo", "degeneracy", "resampling", "particle_vs_ekf", "filter_lab",
+    ),
+    "bayes_kalman": ("bayes_theorem", "map_and_mmse", "gain", "random_walk"),
     "indoor": (),
 }
 

@@ -50,11 +50,16 @@ def summary(entry: Entry, scenario: Scenario, view: View, words: Words) -> dict[
 
 def as_json(entry: Entry, scenario: Scenario, view: View, words: Words) -> str:
     """The summary with the data of every figure and scene item."""
+    return json.dumps(everything(entry, scenario, view, words), ensure_ascii=False, indent=1, allow_nan=False) + "\n"
+
+
+def everything(entry: Entry, scenario: Scenario, view: View, words: Words) -> dict[str, Any]:
+    """What `as_json` writes."""
     found = summary(entry, scenario, view, words)
     found["figures"] = {name: [{"trace": t.meta["key"], "x": plain(np.asarray(t.x)), "y": plain(np.asarray(t.y))}
                                for t in figure.data if t.meta] for name, figure in view.figures.items()}
     found["scene"] = [{"kind": type(item).__name__, **plain(item)} for item in view.scene]
-    return json.dumps(found, ensure_ascii=False, indent=1, allow_nan=False) + "\n"
+    return found
 
 
 def as_csv(view: View, figure: str | None = None) -> str:

@@ -75,6 +75,11 @@
   setInterval(place, 200);
   addEventListener("resize", place);
 
+  // viser also turns the camera while an arrow key moves a slider or changes a tab.
+  document.body.addEventListener("keydown", (event) => {
+    if (event.key.startsWith("Arrow") && event.target.closest("[role=slider], [role=tab]")) event.stopPropagation();
+  });
+
   // viser's inputs carry no accessible name; take it from the row's label.
   let hidden = []; // ids of sliders whose number field shows an exponent
   const nameInputs = () => {

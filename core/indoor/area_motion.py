@@ -14,6 +14,7 @@ from core.types import Array
 
 MOST_REFLECTIONS = 10
 _NONE = np.empty(0, np.intp)
+Mask = NDArray[np.bool_]
 
 
 class Reflected(NamedTuple):
@@ -114,29 +115,37 @@ def _roam(w: Walkers, i: Numbers) -> Numbers:
     w.position[:, 0][i] = x + reach * ux                  # right for all that are far from walls and doors
     w.position[:, 1][i] = y + reach * uy
     w.left[i] = 0.0
-    near = w.clear.near(a, x, y, reach, np.maximum(reach + r, 2.0 * r))
-    far = np.ones(len(i), bool)
-    far[near] = False
-    w.held[i[far]] = False
+    by_wall, by_door = w.clear.near(a, x, y, reach, np.maximum(reach + r, 2.0 * r))
+    w.held[i[~by_door]] = False                           # they are free to decide again
+    near = (by_wall | by_door).nonzero()[0]
     if not near.size:
         return near
     p, u = np.stack([x[near], y[near]], axis=1), np.stack([ux[near], uy[near]], axis=1)
-    return _near_walls(w, i[near], a[near], p, u, reach[near])
+    return _near_walls(w, i[near], a[near], p, u, reach[near], by_wall[near], by_door[near])
 
 
-def _near_walls(w: Walkers, i: Numbers, a: Numbers, p: Array, u: Array, reach: Array) -> Numbers:
-    """`_roam` from p (M, 2) in the direction u (M, 2), with walls and doors."""
-    wall = _first_wall(w.maps.borders, a, p, p + reach[:, None] * u)
-    free = np.minimum(wall.fraction, 1.0) * reach
-    door = _first_door(w, i, a, p, u, free)
-    decides = np.isfinite(door.distance)
-    hits = ~decides & (wall.fraction <= 1.0)
+def _near_walls(
+    w: Walkers, i: Numbers, a: Numbers, p: Array, u: Array, reach: Array, by_wall: Mask, by_door: Mask
+) -> Numbers:
+    """`_roam` from p (M, 2) in the direction u (M, 2), with those walls and doors that may be near."""
+    walked, hits, normal = reach.copy(), np.zeros(len(i), bool), np.zeros((len(i), 2))
+    k = by_wall.nonzero()[0]
+    if k.size:
+        wall = _first_wall(w.maps.borders, a[k], p[k], p[k] + reach[k, None] * u[k])
+        walked[k] *= np.minimum(wall.fraction, 1.0)
+        hits[k], normal[k] = wall.fraction <= 1.0, wall.normal
+    decides, number = np.zeros(len(i), bool), np.zeros(len(i), np.intp)
+    k = by_door.nonzero()[0]
+    if k.size:
+        door = _first_door(w, i[k], a[k], p[k], u[k], walked[k])
+        decides[k], number[k] = np.isfinite(door.distance), door.number
+        walked[k] = np.minimum(walked[k], door.distance)
+    hits &= ~decides
     event = (decides | hits).nonzero()[0]
-    walked = np.where(decides, door.distance, free)[event]
     j = i[event]
-    w.position[j, :2] = p[event] + walked[:, None] * u[event]
-    w.left[j] = ((reach[event] - walked) / w.speed[j]).clip(0.0)
-    on = np.concatenate([_decide(w, i[decides], door.number[decides]), _bounce(w, i[hits], wall.normal[hits])])
+    w.position[j, :2] = p[event] + walked[event, None] * u[event]
+    w.left[j] = ((reach[event] - walked[event]) / w.speed[j]).clip(0.0)
+    on = np.concatenate([_decide(w, i[decides], number[decides]), _bounce(w, i[hits], normal[hits])])
     return on[w.left[on] > 0.0]
 
 
@@ -190,7 +199,7 @@ def _first_door(w: Walkers, i: Numbers, a: Numbers, p: Array, u: Array, reach: A
     squares = cx * cx + cy * cy
     held = w.held[i].T & (squares <= 4.0 * r * r)
     w.held[i] = held.T
-    j, k = np.nonzero((squares <= (reach + r) ** 2) & ~held)
+    j, k = ((squares <= (reach + r) ** 2) & ~held).nonzero()
     if not k.size:
         return Doors(distance, number)
     x, y = cx[j, k], cy[j, k]

@@ -3,6 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.indoor.cloud import Numbers
 from core.indoor.geometry import nearest_on_border
@@ -30,8 +31,10 @@ class Clearance(NamedTuple):
     y0: Array
     per_m: Array
 
-    def near(self, a: Numbers, x: Array, y: Array, wall_m: Array, door_m: Array) -> Numbers:
-        """Numbers of the points (x, y) (M,) in areas a (M,) that may be within wall_m of a wall or door_m of a door."""
+    def near(
+        self, a: Numbers, x: Array, y: Array, wall_m: Array, door_m: Array
+    ) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+        """Which of the points (x, y) (M,) in areas a (M,) may be within wall_m of a wall, and which of a door."""
         scale = self.per_m[a]
         column = (x - self.x0[a]) * scale
         row = (y - self.y0[a]) * scale
@@ -39,9 +42,7 @@ class Clearance(NamedTuple):
         cell *= self.columns[a]
         cell += column.astype(np.intp)
         cell += self.first[a]
-        close = self.walls.take(cell, mode="clip") <= wall_m
-        close |= self.doors.take(cell, mode="clip") <= door_m
-        return close.nonzero()[0]
+        return self.walls.take(cell, mode="clip") <= wall_m, self.doors.take(cell, mode="clip") <= door_m
 
 
 def clearance(graph: FloorGraph) -> Clearance:

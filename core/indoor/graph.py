@@ -1,10 +1,8 @@
 """The floor graph G = (S, O): nodes s, and map objects o, which are links or open areas.  GBPF ch. 3."""
 
-import json
 from collections.abc import Callable, Hashable, Iterable, Mapping
 from dataclasses import dataclass, field
 from os import PathLike
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
@@ -42,7 +40,7 @@ class Area(NamedTuple):
     length_m: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
 class FloorGraph:
     """G = (S, O), O = links and open areas.  GBPF ch. 3.
 
@@ -60,8 +58,8 @@ class FloorGraph:
     areas: Mapping[Id, Area]
     corridor_width_m: float
     floor_height_m: float
-    _at: Mapping[Id, tuple[Id, ...]] = field(init=False, repr=False)
-    _cache: dict[Hashable, Any] = field(init=False, repr=False, default_factory=dict)
+    _at: Mapping[Id, tuple[Id, ...]] = field(init=False)
+    _cache: dict[Hashable, Any] = field(init=False, default_factory=dict)
 
     def __post_init__(self) -> None:
         at: dict[Id, list[Id]] = {n: [] for n in self.nodes}
@@ -71,6 +69,13 @@ class FloorGraph:
             for n in self.nodes_of(o):
                 at[n].append(o)
         object.__setattr__(self, "_at", {n: tuple(objects) for n, objects in at.items()})
+
+    def __repr__(self) -> str:
+        return f"FloorGraph({len(self.nodes)} nodes, {len(self.links)} links, {len(self.areas)} areas)"
+
+    def __reduce__(self) -> tuple[Any, ...]:              # read-only mappings cannot be pickled or copied by themselves
+        return FloorGraph, (dict(self.nodes), dict(self.links), dict(self.areas), self.corridor_width_m,
+                            self.floor_height_m)
 
     @classmethod
     def from_dict(cls, d: Mapping[str, Any]) -> "FloorGraph":
@@ -97,10 +102,13 @@ class FloorGraph:
 
         ValueError for a file that is not JSON, with the line; OSError for a file that cannot be read.
         """
+        import json
+
         from core.indoor.validation import unique_keys
 
         try:
-            d = json.loads(Path(path).read_text(encoding="utf-8"), object_pairs_hook=unique_keys)
+            with open(path, encoding="utf-8") as file:
+                d = json.load(file, object_pairs_hook=unique_keys)
         except (json.JSONDecodeError, UnicodeDecodeError) as error:
             raise ValueError(f"{path}: expected JSON in UTF-8, got {error}") from None
         return cls.from_dict(d)

@@ -17,15 +17,16 @@ class MapArrays(NamedTuple):
 
     length (O,) in metres; origin (O, 3) = first end of a link, or (0, 0, height) for an area; unit (O, 3) the direction
     of a link, zero for an area: the place of a particle on a link is origin + offset unit.  floors (O, 2) at both ends;
-    stairs, lifts (O,) masks.
+    stairs, lifts (O,) masks, uneven if the map has any.
 
     A port is an object at one of its nodes, named (object, node) in `ports`: where a particle leaves or enters the
     object.  The ports of link k are 2k (first end) and 2k + 1; those of area a begin at area_port[a].  port_object,
     port_end (the number of the end or accessor node), port_node (P,).
 
-    Areas a = 0..A-1 with at most J accessor nodes: borders of all areas together, doors (A, J, 2) = nearest points of the area to the
-    accessor nodes (far away if a has fewer), inward (A, J) = direction into the area in radians, NaN for a door far
-    from the border.  door (A, nodes) = number of the accessor node in the area, -1 if it is none of its own.
+    Areas a = 0..A-1 with at most J accessor nodes: borders, of all areas `together`; doors (A, J, 2) = nearest points
+    of the area to the accessor nodes (far away if a has fewer); inward (A, J) = direction into the area in radians, NaN
+    for a door far from the border.  door (A, nodes) = number of the accessor node in the area, -1 if it is none of its
+    own.
     """
 
     n_links: int
@@ -35,6 +36,7 @@ class MapArrays(NamedTuple):
     floors: NDArray[np.intp]
     stairs: NDArray[np.bool_]
     lifts: NDArray[np.bool_]
+    uneven: bool
     ports: tuple[tuple[Id, Id], ...]
     port_number: dict[tuple[Id, Id], int]
     port_object: NDArray[np.intp]
@@ -84,7 +86,8 @@ def _make(graph: FloorGraph) -> MapArrays:
             door[k, node[n]] = j
     return MapArrays(
         n_links=L, length=np.array([graph.length(o) for o in objects]), origin=origin, unit=unit, floors=floors,
-        stairs=kinds == "stairs", lifts=kinds == "lift", ports=ports,
+        stairs=kinds == "stairs", lifts=kinds == "lift",
+        uneven=bool(np.isin(kinds, ("stairs", "lift")).any()), ports=ports,
         port_number={port: k for k, port in enumerate(ports)}, port_object=port_object, port_end=port_end,
         port_node=port_node, area_port=2 * L + np.cumsum([0, *counts[:-1]], dtype=np.intp)[:A],
         borders=together([border(a.polygon) for a in graph.areas.values()]), doors=doors, inward=inward, door=door,

@@ -47,7 +47,7 @@ def advance(graph: FloorGraph, cloud: Cloud, dt_s: float, walk: Walk, rng: np.ra
     maps = map_arrays(graph)
     if cloud.object.min() < 0 or cloud.object.max() >= len(maps.length) or cloud.held.shape[1] != maps.doors.shape[1]:
         raise ValueError("cloud: expected particles of this map, got object numbers or doors that it does not have")
-    w = Walkers.of(cloud, dt_s, graph, walk, rng)
+    w = Walkers(cloud, dt_s, graph, walk, rng)
     if dt_s > 0.0:
         _vary(w, dt_s)
         _wait(w, (w.wait > 0.0).nonzero()[0])

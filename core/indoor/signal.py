@@ -11,6 +11,7 @@ from core.checks import finite
 from core.indoor.graph import FloorGraph
 from core.types import Array
 
+_CACHE = 32_768                                           # numbers that stay in the cache during a few passes
 _LOG_2PI = math.log(2.0 * math.pi)
 
 
@@ -104,17 +105,18 @@ class AccessPoints:
         position_m, floor = np.asarray(position_m), np.asarray(floor)
         rows = (-1,) + (1,) * (position_m.ndim - 1)
         total = np.zeros(position_m.shape[:-1])
-        if heard.size:
-            sigma = self.sigma_db[heard]
-            z = self._mean(position_m, floor, heard)
-            z -= y[heard].reshape(rows)
-            z *= (1.0 / sigma).reshape(rows)
+        few = max(_CACHE // max(total.size, 1), 1)
+        for some in (heard[k:k + few] for k in range(0, heard.size, few)):
+            z = self._mean(position_m, floor, some)
+            z -= y[some].reshape(rows)
+            z *= (1.0 / self.sigma_db[some]).reshape(rows)
             z *= z
-            if self.freedom is None:
-                total = -0.5 * z.sum(axis=0)
-            else:
-                total = -0.5 * (self.freedom + 1.0) * np.log1p(z / self.freedom).sum(axis=0)
-            total += heard.size * self._log_constant() - np.log(sigma).sum()
+            if self.freedom is not None:
+                z /= self.freedom
+                np.log1p(z, out=z)
+            total += z.sum(axis=0) if len(some) > 1 else z[0]
+        total *= -0.5 if self.freedom is None else -0.5 * (self.freedom + 1.0)
+        total += heard.size * self._log_constant() - np.log(self.sigma_db[heard]).sum()
         if self.unheard == "censored" and heard.size < len(self):
             from scipy.special import log_ndtr
 

@@ -1,62 +1,42 @@
 """Particles during a step: working copies of a cloud's arrays, and the time each particle has left."""
 
-from dataclasses import dataclass, field
-from typing import Self
-
 import numpy as np
 
-from core.indoor.choice import ChoiceTable, categorical, choice_table
-from core.indoor.clearance import Clearance, clearance
+from core.indoor.choice import categorical, choice_table
+from core.indoor.clearance import clearance
 from core.indoor.cloud import Cloud, Numbers
 from core.indoor.graph import FloorGraph
-from core.indoor.map_arrays import MapArrays, map_arrays
+from core.indoor.map_arrays import map_arrays
 from core.indoor.walk import Walk
 from core.types import Array
 
 _NONE = np.empty(0, np.intp)
 
 
-@dataclass(slots=True)
 class Walkers:
-    """The fields of `Cloud`, to be written to; left (N,): seconds of the step not yet walked; log: the decisions."""
+    """The fields of `Cloud`, copied to be written to.
 
-    object: Numbers
-    offset: Array
-    direction: Array
-    position: Array
-    heading: Array
-    speed: Array
-    stopped: Array
-    wait: Array
-    goal: Numbers
-    held: Array
-    left: Array
-    maps: MapArrays
-    clear: Clearance
-    table: ChoiceTable
-    walk: Walk
-    rng: np.random.Generator
-    special: bool
-    bounces: Numbers
-    log: list[tuple[Numbers, Numbers, Numbers]] = field(default_factory=lambda: [(_NONE, _NONE, _NONE)])
+    left (N,): seconds of the step not yet walked; log: the decisions, as particles and ports before and after; bounces
+    (N,): reflections so far, empty on a map without areas.
+    """
 
-    @classmethod
-    def of(
-        cls, c: Cloud, dt_s: float, graph: FloorGraph, walk: Walk, rng: np.random.Generator
-    ) -> Self:
-        """Copies of a cloud's arrays, with a whole step to go."""
-        maps, N = map_arrays(graph), len(c.object)
-        return cls(
-            c.object.copy(), c.offset_m.copy(), c.direction.copy(), np.array(c.position_m.T, order="C").T,
-            c.heading_rad.copy(), c.speed_mps.copy(), c.stopped.copy(), c.wait_s.copy(), c.goal.copy(), c.held.copy(),
-            np.full(N, float(dt_s)), maps, clearance(graph), choice_table(graph, walk.rule, walk.l_max_m, walk.u_turn),
-            walk, rng, bool((maps.stairs | maps.lifts).any()), np.zeros(N if len(maps.doors) else 0, np.intp),
-        )
+    def __init__(self, c: Cloud, dt_s: float, graph: FloorGraph, walk: Walk, rng: np.random.Generator) -> None:
+        N = len(c.object)
+        self.object, self.offset, self.direction = c.object.copy(), c.offset_m.copy(), c.direction.copy()
+        self.position = np.array(c.position_m.T, order="C").T
+        self.heading, self.speed, self.stopped = c.heading_rad.copy(), c.speed_mps.copy(), c.stopped.copy()
+        self.wait, self.goal, self.held = c.wait_s.copy(), c.goal.copy(), c.held.copy()
+        self.left = np.full(N, float(dt_s))
+        self.maps, self.clear = map_arrays(graph), clearance(graph)
+        self.table = choice_table(graph, walk.rule, walk.l_max_m, walk.u_turn)
+        self.walk, self.rng = walk, rng
+        self.bounces = np.zeros(N if len(self.maps.doors) else 0, np.intp)
+        self.log = [(_NONE, _NONE, _NONE)]
 
     def rate(self, i: Numbers, o: Numbers) -> Array:
         """Metres per second along the objects o of the particles i."""
         v = self.speed[i]
-        if not self.special:
+        if not self.maps.uneven:
             return v
         v = np.where(self.maps.stairs[o], self.walk.stairs_factor * v, v)
         return np.where(self.maps.lifts[o], self.walk.lift_speed_mps, v)

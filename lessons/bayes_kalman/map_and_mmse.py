@@ -7,7 +7,7 @@ import numpy as np
 
 from core import kalman
 from core.gaussian import mahalanobis_squared, sample
-from core.linear_update import Information, information_update, map_cost
+from core.linear_update import Information, information_update
 from core.sensors import Linear
 from core.types import Array, Gaussian
 from lessons.bayes_kalman._map_view import view
@@ -42,6 +42,7 @@ class Params:
 class Result(NamedTuple):
     """Three ways to one point."""
 
+    told: Array                  # (2,) a state that the measurement speaks for: y = H told
     y: Array                     # (m,)
     sensor: Linear
     gain_form: kalman.Update     # (3.10) and the gain
@@ -74,19 +75,14 @@ def compute(p: Params, progress: Progress) -> Result:
     sums = np.vstack([np.zeros(2), np.cumsum(x, axis=0)])[counts]
     with np.errstate(invalid="ignore"):
         means = sums / np.array(counts, dtype=float)[:, None]
-    return Result(y, sensor, step, info, float(np.abs(step.posterior.mean - info.posterior.mean).max()), x,
-                  np.array(counts), means)
-
-
-def costs(r: Result, x: Array) -> tuple[Array, Array]:
-    """The two terms of (3.4) at points (..., 2): from the measurement and from the prior."""
-    return map_cost(r.gain_form.prior, r.y, r.sensor, x)
+    gap = float(np.abs(step.posterior.mean - info.posterior.mean).max())
+    return Result(np.array(p.told), y, sensor, step, info, gap, x, np.array(counts), means)
 
 
 def timeline(p: Params) -> Timeline:
     """Batches of imagined worlds; the derivation as stages."""
-    return Timeline(BATCHES, ("prior", "measurement", "sum", "minimum", "mean"), start=BATCHES, scale=BATCH / 1000,
-                    unit="thousand worlds", unit_name="n")
+    return Timeline(BATCHES, ("prior", "measurement", "sum", "minimum", "mean"), start=BATCHES, scale=BATCH,
+                    unit_name="n")
 
 
 LESSON = Lesson(

@@ -114,7 +114,7 @@ def _camera(p: "Params", r: "Result") -> Plane:
     points = np.vstack([spread, r.truth[:, :2], tracks[near], r.stations if p.zoom == "stations" else spread])
     low, high = points.min(axis=0), points.max(axis=0)
     margin = 0.06 * float((high - low).max()) + 4.0
-    (x0, y0), (x1, y1) = low - margin, high + margin
+    (x0, y0), (x1, y1) = low - margin, high + margin + (0.0, margin)      # the caption stands at the top
     return Plane((float(x0), float(x1)), (float(y0), float(y1)), "x₁ (m)", "x₂ (m)")
 
 

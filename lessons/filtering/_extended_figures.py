@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from lessons.filtering.extended import Params, Result
 
 ALONG = np.linspace(-2.5, 2.5, 101)          # prior sigmas
+LEAST_COST = 0.01                            # less is drawn there, on a logarithmic axis
 PRIOR, LIKELIHOOD, POSTERIOR, TANGENT, UPDATE = range(5)
 
 
@@ -80,14 +81,12 @@ def _share(r: "Result") -> "go.Figure":
 
 
 def _cost(r: "Result", i: int) -> "go.Figure":
-    """What the iterations try to make small."""
+    """What the iterations try to make small; logarithmic, since far from the peak it is huge."""
     n = np.arange(len(r.cost))
-    least = float(r.cost_at_mode)
-    shown = np.minimum(r.cost, max(4.0 * least + 20.0, float(r.cost[1:].min()) * 1.5))
+    cost, least = np.clip(r.cost, LEAST_COST, 1e9), max(r.cost_at_mode, LEAST_COST)
     return plot.chart(
         plot.line("mode", n[[0, -1]], np.full(2, least), "posterior", dash=True),
-        plot.line("cost", n, np.where(r.cost > 1e6, 1e6, r.cost), "vector", markers=True),
-        cursor=i + 1, y_range=(0.0, 1.1 * float(shown.max())))
+        plot.line("cost", n, cost, "vector", markers=True), cursor=i + 1, log_y=True)
 
 
 def readouts(p: "Params", r: "Result", i: int) -> list[Readout]:

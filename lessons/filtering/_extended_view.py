@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from core.grid import GridDensity
 from core.types import Gaussian
 from lessons.filtering._extended_curves import clipped, level_line, tangent_line
 from lessons.filtering._extended_figures import equations, figures, readouts
@@ -48,7 +49,7 @@ def _scene(p: "Params", r: "Result", at: Moment) -> list[Item]:
     if stage == LIKELIHOOD:
         items.append(HeatMap("likelihood", *r.map_axes, r.likelihood.T, role="likelihood", opacity=0.75))
     if stage >= POSTERIOR:
-        items.append(HeatMap("exact", *r.exact.axes, r.exact.weights.T, role="posterior", opacity=0.85))
+        items.append(_true_posterior(r.exact))
     items += _known(p, r)
     if stage >= LIKELIHOOD:
         items += _measured(r)
@@ -66,6 +67,13 @@ def _scene(p: "Params", r: "Result", at: Moment) -> list[Item]:
                   Points("iterate_points", r.points[1:done + 1], role="vector", size=7),
                   LevelEllipse("iterated", latest, role="vector", probability=PROBABILITY, width=4.5, filled=True)]
     return items
+
+
+def _true_posterior(exact: GridDensity) -> HeatMap:
+    """The probabilities of blocks of 2 x 2 cells: enough for the eye, and a quarter of the data."""
+    x, y = (axis.reshape(-1, 2).mean(axis=1) for axis in exact.axes)
+    return HeatMap("exact", x, y, exact.weights.reshape(len(x), 2, len(y), 2).sum(axis=(1, 3)).T, role="posterior",
+                   opacity=0.85)
 
 
 def _known(p: "Params", r: "Result") -> list[Item]:

@@ -1,4 +1,4 @@
-"""How the test of the innovation is drawn: the gate as an ellipse, what is rejected, and the statistics that tell why."""
+"""How the test of the innovation is drawn: the gate as an ellipse, what is rejected, and the statistics."""
 
 from typing import TYPE_CHECKING
 
@@ -97,7 +97,7 @@ def _beside(camera: Plane, at: Array, direction: Array) -> Array:
 
 
 def _camera(p: "Params", r: "Result") -> Plane:
-    """The true track, both estimates, the good measurements and the user's garbage; garbage far away may lie outside."""
+    """The true track, both estimates, the good measurements and the user's garbage; other garbage if it is near."""
     parts = [r.truth[:, :2], r.y[~r.garbage], _estimates(r, r.used), _estimates(r, r.plain)]
     if p.garbage_step:
         parts.append(np.array([p.garbage]))

@@ -54,7 +54,7 @@ class Result(NamedTuple):
 
 
 def compute(p: Params, progress: Progress) -> Result:
-    """Simulates RUNS paths in small exact steps; predicts their law in K large ones, exactly and by the other scheme."""
+    """Simulates RUNS paths in small exact steps; predicts their law in K large ones, by both schemes."""
     K = steps(p)
     begin, move = np.random.default_rng(p.seed).spawn(2)
     start = Gaussian(np.array([0.0, 0.0, p.speed_mps, 0.0]),

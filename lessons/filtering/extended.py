@@ -27,8 +27,8 @@ from lessons.kit.lesson import Lesson, Progress, Timeline
 from lessons.kit.params import Point, choice, draggable, slider
 
 ITERATIONS = 10
-CELLS = 150                                  # per axis of the grid behind the true posterior
-MAP = 110                                    # per axis of the drawn likelihood
+CELLS = 200                                  # per axis of the grid behind the true posterior
+MAP = 90                                     # per axis of the drawn likelihood
 FACTORS = np.geomspace(0.1, 2.0, 14)         # of the prior's sigmas in the plot of the shares
 UNUSED = {"range": {"sigma_deg", "station_2"}, "bearing": {"sigma_m", "station_2"}, "difference": {"sigma_deg"},
           "two_ranges": {"sigma_deg"}}

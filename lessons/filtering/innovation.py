@@ -1,4 +1,4 @@
-"""What the innovation tells: garbage among the measurements, and noise that is not what the filter assumes.  MAT 3.2."""
+"""What the innovation tells: garbage among the measurements, and wrong beliefs about the noise.  MAT 3.2."""
 
 from dataclasses import dataclass
 from typing import NamedTuple

@@ -247,6 +247,13 @@ def test_an_empty_folder_of_lessons(capsys, tmp_path):
     assert "--lessons" in capsys.readouterr().err
 
 
+def test_a_failing_lesson_is_an_error_of_its_own(labs, capsys, tmp_path):
+    for command in (["run"], ["export", "--to", str(tmp_path / "x.json")]):
+        assert main([command[0], *labs, "labs.fragile", "--set", "broken=1", *command[1:]]) == 1
+        assert capsys.readouterr().err == "paikka: labs.fragile failed: ValueError: the matrix is <b>singular</b>\n"
+    assert not list(tmp_path.iterdir())
+
+
 def test_an_unknown_command(capsys):
     with pytest.raises(SystemExit) as stopped:
         main(["fly"])

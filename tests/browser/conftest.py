@@ -14,12 +14,6 @@ from tests.browser.visit import OUTSIDE, Visit
 NewVisit = Callable[..., Visit]
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    for item in items:
-        if "tests/browser/" in item.nodeid.replace(os.sep, "/"):
-            item.add_marker(pytest.mark.browser)
-
-
 @pytest.fixture(scope="package")
 def app() -> Iterator[App]:
     app = App(Registry(), port=0)

@@ -2,8 +2,12 @@
 
 from urllib.parse import parse_qs, urlsplit
 
+import pytest
+
 from lessons.kit.lesson import Moment
 from tests.browser.visit import Visit
+
+pytestmark = pytest.mark.browser
 
 
 def query_of(visit: Visit) -> dict[str, str]:

@@ -6,6 +6,8 @@ from playwright.sync_api import expect
 from lessons.kit.lesson import Moment
 from tests.browser.visit import Visit, difference
 
+pytestmark = pytest.mark.browser
+
 
 def test_slider_by_keyboard_changes_numbers_plot_and_picture(visit: Visit) -> None:
     visit.open("lesson=filtering.kalman", drawn=False)
@@ -13,8 +15,8 @@ def test_slider_by_keyboard_changes_numbers_plot_and_picture(visit: Visit) -> No
     plot = visit.plot()
     slider = visit.slider("σ x (m)")
     slider.focus()
-    for _ in range(5):
-        visit.page.keyboard.press("ArrowRight")
+    for _ in range(3):
+        visit.page.keyboard.press("ArrowRight", delay=400)  # held long enough for viser to notice it too
     value = float(slider.get_attribute("aria-valuenow") or 0)
     assert value > 30
     visit.shows(lambda s: s.params.sigma_x_m == value, "the slider's value")

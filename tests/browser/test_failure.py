@@ -9,6 +9,8 @@ from app.server import App
 from lessons.registry import Registry
 from tests.browser.visit import Visit
 
+pytestmark = pytest.mark.browser
+
 LESSON = '''
 from dataclasses import dataclass
 
@@ -74,3 +76,14 @@ def test_message_in_its_panel_and_others_go_on(new_visit, fragile: App) -> None:
     bad.shows(lambda s: s.params.size == 2.0, "a value that works")
     message.wait_for(state="hidden")
     assert not bad.session.error
+
+
+def test_these_tests_notice_errors_and_requests_elsewhere(visit: Visit) -> None:
+    visit.open("lesson=background.rotation_vector", drawn=False)
+    visit.page.evaluate("fetch('http://192.0.2.1/outside').catch(() => 0)")
+    visit.page.evaluate("setTimeout(() => { throw new Error('broken') })")
+    visit.until(lambda: len(visit.complaints) >= 3, "the complaints")
+    assert any("http://192.0.2.1/outside" in complaint for complaint in visit.complaints)
+    assert any(complaint.startswith("page error") and "broken" in complaint for complaint in visit.complaints)
+    assert any("ERR_FAILED" in complaint for complaint in visit.complaints), "it was blocked"
+    visit.complaints.clear()

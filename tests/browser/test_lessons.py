@@ -1,4 +1,4 @@
-"""Every lesson opens, in light and in dark, with typeset formulas and named controls, also on a phone."""
+"""Every lesson opens, in light and in dark, with typeset formulas and named controls; the page works on a phone."""
 
 import numpy as np
 import pytest
@@ -8,6 +8,8 @@ from app.draw.primitives import style_for
 from app.theme import THEMES
 from lessons.registry import Registry
 from tests.browser.visit import Visit, colors
+
+pytestmark = pytest.mark.browser
 
 LESSONS = [entry.id for entry in Registry()]
 
@@ -26,33 +28,19 @@ def near_labels(visit: Visit, picture: np.ndarray) -> np.ndarray:
 
 
 @pytest.mark.parametrize("lesson", LESSONS)
-def test_opens_in_light_and_dark(visit: Visit, lesson: str) -> None:
+def test_lesson(visit: Visit, lesson: str) -> None:
     visit.open(f"lesson={lesson}", drawn=False)
-    light = visit.canvas()
-    texts = near_labels(visit, light)
-    assert colors(light) > 100 and (light != 255).any(axis=-1).mean() > 0.01
-    assert (np.median(light.reshape(-1, 3), axis=0) > 250).all()
-    assert (texts.max(axis=1) < 90).mean() > 0.005, "dark text"
-
+    check_text(visit)
+    check_names(visit)
+    check_light(visit)
     visit.page.keyboard.press("t")
     visit.shows(lambda s: s.theme == "dark", "the dark theme")
-    dark = visit.canvas()
-    texts = near_labels(visit, dark)
-    assert visit.page.evaluate("window.paikka.labels.dark && window.paikka.labels.patched > 0")
-    assert colors(dark) > 100
-    assert (np.median(dark.reshape(-1, 3), axis=0) < 40).all()
-    assert (texts.min(axis=1) > 170).mean() > 0.005, "light text"
-    assert (texts.min(axis=1) > 170).mean() < 0.3, "no light boxes behind the text"
-    background = visit.page.locator(".js-plotly-plot").first.evaluate(
-        "plot => { let e = plot, c; do { c = getComputedStyle(e).backgroundColor; e = e.parentElement } "
-        "while (e && c === 'rgba(0, 0, 0, 0)'); return c.match(/[0-9]+/g).slice(0, 3).map(Number) }")
-    assert max(background) < 60, "plots are dark too"
+    check_dark(visit)
 
 
-@pytest.mark.parametrize("lesson", LESSONS)
-def test_text_formulas_and_names(visit: Visit, lesson: str) -> None:
-    visit.open(f"lesson={lesson}", drawn=False)
-    page, words = visit.page, visit.app.registry[lesson].words()
+def check_text(visit: Visit) -> None:
+    """Title, typeset formulas, and nothing from another host."""
+    page, words = visit.page, visit.app.registry[visit.scenario.lesson].words()
     page.locator(".pk-title", has_text=words.title).wait_for()
     formulas = page.locator(".pk svg")
     formulas.first.wait_for()
@@ -61,17 +49,46 @@ def test_text_formulas_and_names(visit: Visit, lesson: str) -> None:
     assert "$" not in page.locator(".pk", has=page.locator(".pk-title")).inner_text()
     size = formulas.first.bounding_box()
     assert size is not None and size["width"] > 5 and size["height"] > 5
-
     linked = page.evaluate("[...document.querySelectorAll('[src], [href]')].map(e => e.src || e.href)"
                            ".filter(u => typeof u === 'string')")
     assert all(link.startswith((visit.app.url, "data:", "blob:")) for link in linked), linked
 
-    page.wait_for_function("[...document.querySelectorAll('[role=slider]')].every(e => e.getAttribute('aria-label'))")
-    names = page.evaluate("[...document.querySelectorAll('[role=slider]')].map(e => e.getAttribute('aria-label'))")
-    shown = page.evaluate("[...document.querySelectorAll('label[for]')].map(e => e.textContent)")
-    first = next(p for p in visit.app.registry[lesson].parameters.values() if p.kind in ("float", "int"))
-    assert any(name.startswith(words.label("params", first.name)) for name in names)
+
+def check_names(visit: Visit) -> None:
+    """Every slider's accessible name is the text beside it, and they all differ."""
+    entry = visit.app.registry[visit.scenario.lesson]
+    visit.page.wait_for_function(
+        "[...document.querySelectorAll('[role=slider]')].every(e => e.getAttribute('aria-label'))")
+    names = visit.page.evaluate(
+        "[...document.querySelectorAll('[role=slider]')].map(e => e.getAttribute('aria-label'))")
+    shown = visit.page.evaluate("[...document.querySelectorAll('label[for]')].map(e => e.textContent)")
+    unused = entry.lesson.unused_at(visit.scenario.params)
+    first = next((p for p in entry.parameters.values() if p.kind in ("float", "int") and p.name not in unused), None)
+    assert first is None or any(name.startswith(entry.words().label("params", first.name)) for name in names)
     assert len(set(names)) == len(names) and set(names) <= set(shown), names
+
+
+def check_light(visit: Visit) -> None:
+    """A white scene with things in it, and dark labels."""
+    picture = visit.canvas()
+    texts = near_labels(visit, picture)
+    assert colors(picture) > 100 and (picture != 255).any(axis=-1).mean() > 0.01
+    assert (np.median(picture.reshape(-1, 3), axis=0) > 250).all()
+    assert (texts.max(axis=1) < 90).mean() > 0.005, "dark text"
+
+
+def check_dark(visit: Visit) -> None:
+    """A dark scene with light labels that have no boxes, and dark plots."""
+    picture = visit.canvas()
+    texts = near_labels(visit, picture)
+    assert visit.page.evaluate("window.paikka.labels.dark && window.paikka.labels.patched > 0")
+    assert colors(picture) > 100
+    assert (np.median(picture.reshape(-1, 3), axis=0) < 40).all()
+    assert 0.005 < (texts.min(axis=1) > 170).mean() < 0.3, "light text, and no light boxes behind it"
+    background = visit.page.locator(".js-plotly-plot").first.evaluate(
+        "plot => { let e = plot, c; do { c = getComputedStyle(e).backgroundColor; e = e.parentElement } "
+        "while (e && c === 'rgba(0, 0, 0, 0)'); return c.match(/[0-9]+/g).slice(0, 3).map(Number) }")
+    assert max(background) < 60, "plots are dark too"
 
 
 @pytest.mark.parametrize("lesson, control", [("background.rotation_vector", "Angle"), ("filtering.kalman", "σ x (m)")])

@@ -12,6 +12,8 @@ from PIL import Image
 
 from tests.browser.visit import Visit, colors
 
+pytestmark = pytest.mark.browser
+
 SIZES = {"1920 × 1080": (1920, 1080), "3840 × 2160": (3840, 2160)}
 ROOT = Path(__file__).parents[2]
 

@@ -87,6 +87,7 @@ class Visit:
     def canvas(self) -> np.ndarray:
         """The scene without what lies over it, as (height, width, 3) bytes."""
         self.drawn()
+        assert not self.session.error, self.session.error
         png = self.page.locator(CANVAS).screenshot(
             style="#pk-overlay, .mantine-Notification-root { visibility: hidden !important; }")
         return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))

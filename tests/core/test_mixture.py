@@ -482,3 +482,12 @@ def test_default_parts_leave_no_gaps():
 
 def test_defaults_do_not_split():
     assert Upkeep() == DEFAULT and DEFAULT.split_beyond is None
+
+
+def test_singular_covariances_are_no_obstacle_to_one_component():
+    """Erratum K7: a state that is known exactly and has no noise."""
+    start, motion = Gaussian(np.zeros(2), np.zeros((2, 2))), LinearMotion(np.eye(2), np.diag([1.0, 0.0]))
+    sensor, ys = Linear([[1.0, 1.0]], [[1.0]]), [[1.0], [2.0]]
+    got, expected = gm.run(start, ys, motion, sensor), kalman.run(start, ys, motion, sensor)
+    np.testing.assert_allclose(got.means, expected.posterior.mean, atol=1e-12)
+    np.testing.assert_allclose(got.covs, expected.posterior.cov, atol=1e-12)

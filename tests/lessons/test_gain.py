@@ -127,7 +127,7 @@ def test_stages_show_one_thing_after_the_other():
         views = [lesson.view(p, result(p), Moment(24, stage)) for stage in range(4)]
         names = [{i.name for i in v.scene} for v in views]
         assert names[0] < names[1] < names[2] <= names[3]
-        for _stage, v in enumerate(views):
+        for v in views:
             assert isinstance(v.camera, kind) and v.camera == views[0].camera
             assert any(e.current for e in v.equations)
             assert [len(e.pieces) > 1 for e in v.equations] == sorted((len(e.pieces) > 1 for e in v.equations),

@@ -1,4 +1,4 @@
-"""What the lesson on the innovation claims: the oracle's gate, garbage kept out, and four ways to be wrong told apart."""
+"""What the lesson on the innovation claims: the oracle's gate, garbage kept out, four wrong noises told apart."""
 
 import itertools
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""What the lesson on Monte Carlo integration claims: the right variance, the slope, and what the proposal does to it."""
+"""What the lesson on Monte Carlo integration claims: the right variance, the slope, what the proposal does to it."""
 
 from dataclasses import replace
 from functools import cache

@@ -1,4 +1,6 @@
+import copy
 import json
+import pickle
 from types import MappingProxyType
 
 import numpy as np
@@ -64,6 +66,13 @@ def test_to_dict_and_json_come_back(g, tmp_path):
     assert g.nodes == h.nodes and g.links == h.links and list(g.areas) == list(h.areas)
     for o in g.object_ids:
         assert h.length(o) == g.length(o)
+
+
+def test_copies_and_pickles():
+    for h in (copy.deepcopy(M1), pickle.loads(pickle.dumps(M1))):
+        assert h.nodes == M1.nodes and h.links == M1.links and h.objects_at("n1") == M1.objects_at("n1")
+        assert h.length("H") == 128.0
+    assert repr(M1) == "FloorGraph(11 nodes, 10 links, 1 areas)"
 
 
 def test_a_graph_cannot_be_changed_and_leaves_its_source_alone():
