@@ -72,8 +72,9 @@ def merge(m: Mixture, below: float, max_components: int | None = None) -> Reduct
     owner, lost = np.tile(np.arange(c), (len(w), 1)), np.zeros(len(w))
     log_det = _log_det(P)
     cost = np.full((len(w), c, c), np.inf)
-    for i in range(c - 1):
-        cost[:, i, i + 1:] = _costs(w, x, P, log_det, alive, i)[:, i + 1:]
+    i, j = np.triu_indices(c, 1)
+    pairs = _cost(*(a[:, i] for a in (w, x, P, log_det)), *(a[:, j] for a in (w, x, P, log_det)))
+    cost[:, i, j] = np.where(alive[:, i] & alive[:, j], pairs, np.inf)
     rows = np.arange(len(w))
     while len(rows):
         nearest = cost[rows].reshape(len(rows), -1).argmin(axis=1)
@@ -89,10 +90,11 @@ def merge(m: Mixture, below: float, max_components: int | None = None) -> Reduct
         lost[rows] += price
         owner[rows] = np.where(owner[rows] == j[:, None], i[:, None], owner[rows])
         cost[rows, j, :] = cost[rows, :, j] = np.inf
-        renewed = _costs(w[rows], x[rows], P[rows], log_det[rows], alive[rows], i)
-        later = np.arange(c) > i[:, None]
-        cost[rows, i, :] = np.where(later, renewed, np.inf)
-        cost[rows, :, i] = np.where(later, np.inf, renewed)
+        renewed = _cost(*(a[rows, i][:, None] for a in (w, x, P, log_det)), *(a[rows] for a in (w, x, P, log_det)))
+        other = np.arange(c) - i[:, None]
+        renewed = np.where(alive[rows] & (other != 0), renewed, np.inf)
+        cost[rows, i, :] = np.where(other > 0, renewed, np.inf)
+        cost[rows, :, i] = np.where(other < 0, renewed, np.inf)
     with np.errstate(divide="ignore"):
         log_weights = np.where(alive, np.log(w), -np.inf)
     after, place = pack(log_weights - log_sum(log_weights)[:, None], x, P)
@@ -109,17 +111,16 @@ def _log_det(P: Array) -> Array:
     return 2.0 * sum(np.log(L[..., k, k]) for k in range(P.shape[-1]))
 
 
-def _costs(w: Array, x: Array, P: Array, log_det: Array, alive: Array, i: int | Array) -> Array:
-    """Runnalls' cost of joining component i (one number, or one per row) with each, (B, c); inf with none or itself."""
-    rows, every = np.arange(len(w)), np.arange(w.shape[1])
-    wi, ai = w[rows, i][:, None], alive[rows, i][:, None]
-    total = wi + w
-    share = np.divide(w, total, out=np.zeros_like(total), where=total > 0)
-    d = x - x[rows, i][:, None, :]
-    joined = ((1 - share)[..., None, None] * P[rows, i][:, None] + share[..., None, None] * P
-              + (share * (1 - share))[..., None, None] * d[..., :, None] * d[..., None, :])
-    cost = 0.5 * (total * _log_det(joined) - wi * log_det[rows, i][:, None] - w * log_det)
-    return np.where(alive & ai & (every != np.reshape(i, (-1, 1))), np.maximum(cost, 0.0), np.inf)
+def _cost(
+    w1: Array, x1: Array, P1: Array, log_det1: Array, w2: Array, x2: Array, P2: Array, log_det2: Array
+) -> Array:
+    """Runnalls' cost of joining two components, shape (...)."""
+    w = w1 + w2
+    share = np.divide(w2, w, out=np.zeros_like(w), where=w > 0)
+    a, b = (1 - share)[..., None, None], share[..., None, None]
+    d = x2 - x1
+    P = a * P1 + b * P2 + a * b * d[..., :, None] * d[..., None, :]
+    return np.maximum(0.5 * (w * _log_det(P) - w1 * log_det1 - w2 * log_det2), 0.0)
 
 
 def _union(w: Array, x: Array, P: Array, rows: Array, i: Array, j: Array) -> tuple[Array, Array, Array]:
@@ -133,6 +134,7 @@ def _union(w: Array, x: Array, P: Array, rows: Array, i: Array, j: Array) -> tup
 
 
 def check_limits(name: str, below: float, max_components: int | None) -> None:
+    """ValueError unless the limit is a number >= 0 and max_components None or a whole number >= 1."""
     if not 0.0 <= below < np.inf:
         raise ValueError(f"{name}: expected a number >= 0, got {below}")
     if max_components is not None and (max_components != int(max_components) or max_components < 1):

@@ -96,5 +96,6 @@ def _hermite(k: int) -> tuple[Array, Array]:
 
 
 def check_parts(parts: int, ratio: float | None) -> None:
+    """ValueError unless parts is a whole number >= 2 and ratio None or within (0, 1)."""
     if parts != int(parts) or parts < 2 or (ratio is not None and not 0.0 < ratio < 1.0):
         raise ValueError(f"expected at least 2 parts and a ratio in (0, 1), got {parts} and {ratio}")

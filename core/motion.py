@@ -72,10 +72,6 @@ class LinearMotion:
         """
         return linear_sampler(self.Phi, self.root)
 
-    def sampler(self) -> Sampler:
-        """`sample` for whole blocks of a particle filter, from float32 noise: see `core.noise.linear_sampler`."""
-        return linear_sampler(self.Phi, self.root)
-
     def _state(self, x: Array) -> Array:
         x = np.asarray(x, dtype=np.float64)
         if x.ndim == 0 or x.shape[-1] != len(self.Q):

@@ -119,8 +119,8 @@ def _through(glass: Glass, name: str, t: "Track", r: "Result", path: Array, at: 
     corner = glass.corners[3] + np.array([0.04, -0.07]) * 2 * glass.half * glass.scale
     bar = glass.corners[0] + np.array([0.05, 0.06]) * 2 * glass.half * glass.scale
     return [*items, Label(f"{name}_name", name, corner, anchor="left", size=1.1),
-            Segments(f"{name}_bar", np.array([[bar, [*bar, glass.scale, 0.0]]]), role="reference", width=4),
-            Label(f"{name}_metre", "1 m", [*bar, 1.25 * glass.scale, 0.0], anchor="left", size=0.9)]
+            Segments(f"{name}_bar", np.array([[bar, bar + np.array([glass.scale, 0.0])]]), role="reference", width=4),
+            Label(f"{name}_metre", "1 m", bar + np.array([1.25 * glass.scale, 0.0]), anchor="left", size=0.9)]
 
 
 def _ellipse(glass: Glass, name: str, g: Gaussian, role: Role, early: bool) -> list[Item]:

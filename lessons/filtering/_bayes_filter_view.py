@@ -40,7 +40,7 @@ def _note(p: "Params", step: "Step", stage: int) -> str:
     if stage >= LIKELIHOOD and not step.possible:
         return "This y is impossible under the prior: it is ignored."
     if stage == ESTIMATE and p.space == "line" and _density_at(step, step.law.mean) < 1e-6:
-        return "The mean lies where the posterior density is practically 0."
+        return "The posterior is practically 0 at its mean."
     return ""
 
 
@@ -63,7 +63,7 @@ def _panels(p: "Params", r: "Result", step: "Step", stage: int) -> tuple[list[It
     titles = {"prior": "prior p(x | earlier y), 1/rad", "measured": "sin x, and the measurement y",
               "likelihood": "likelihood p(y | x)", "posterior": "posterior p(x | y), 1/rad"}
     if not measured:
-        titles |= {"measured": "sin x: nothing is measured at k = 0", "likelihood": "likelihood: of nothing"}
+        titles |= {"measured": "sin x: nothing is measured at k = 0", "likelihood": "likelihood: no measurement yet"}
     for row, (name, top) in enumerate(tops.items()):
         low = -top if name == "measured" else 0.0
         panel = Panel(np.array([x[0], low]), np.array([x[-1], top]), np.array([0.0, row * (TALL + GAP)]),

@@ -1,4 +1,4 @@
-"""How one update of three filters is drawn: true circles, the straight lines that stand for them, and what comes out."""
+"""How one update of three filters is drawn: circles, the straight lines that stand for them, what comes out."""
 
 from typing import TYPE_CHECKING
 

@@ -44,7 +44,7 @@ def _caption(p: "Params", r: "Result", at: Moment) -> str:
 
 
 def _note(p: "Params", r: "Result", at: Moment) -> str:
-    lost = np.flatnonzero((r.copies < np.floor(p.n * r.w + 1e-12)))
+    lost = np.flatnonzero(r.copies < np.floor(p.n * r.w + 1e-12))
     wrong = _wrong(r)
     done = at.step == p.n and at.stage == COPY
     if wrong.any() and done:

@@ -148,7 +148,8 @@ def on_grid(p: Params, initial: Gaussian, y: Array, motion: LinearMotion, sensor
     shape, width = counts(p), 5.0 if len(initial.mean) == 2 else 4.0
     density = grid.from_gaussian(initial, grid.gaussian_axes(initial, shape, width))
     start = grid.marginal(density, (0, 1))
-    axes, before, after, laws, lost, cell = [start.axes], [start.weights], [start.weights], [position(initial)], 0.0, 0.0
+    axes, before, after, laws = [start.axes], [start.weights], [start.weights], [position(initial)]
+    lost, cell = 0.0, 0.0
     for k in range(STEPS):
         # One step at a time: a four-dimensional density is large, and only its positions are drawn.
         step = grid.run(density, y[k:k + 1], motion, sensor, width=width, components=(0, 1))
