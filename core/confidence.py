@@ -26,7 +26,7 @@ class Law(NamedTuple):
 
     tail: Callable[[Array], Array]
     level: Callable[[Array], Array]
-    sample: Callable[[np.random.Generator, int | tuple[int, ...]], Array]
+    sample: Callable[["np.random.Generator", int | tuple[int, ...]], Array]
 
 
 class Coverage(NamedTuple):

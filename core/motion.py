@@ -46,7 +46,7 @@ class LinearMotion:
         x = self._state(x)
         return self.Phi if x.ndim == 1 else np.broadcast_to(self.Phi, x.shape[:-1] + self.Phi.shape)
 
-    def sample(self, x: Array, rng: np.random.Generator) -> Array:
+    def sample(self, x: Array, rng: "np.random.Generator") -> Array:
         """Phi x + L u,  u ~ N(0, I): one draw for each x (..., n).
 
         The result has contiguous components, out[..., i], whatever the layout of x.

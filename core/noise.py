@@ -19,7 +19,7 @@ Noise = NDArray[np.float32]
 Sampler = Callable[[Array, Noise, Array], None]
 
 
-def stream_key(rng: np.random.Generator) -> tuple[int, ...]:
+def stream_key(rng: "np.random.Generator") -> tuple[int, ...]:
     """128 bits from rng, the common entropy of the streams of one draw.
 
     Unlike `rng.spawn` this depends on rng's state alone, so a restored state replays the same noise.
@@ -27,7 +27,7 @@ def stream_key(rng: np.random.Generator) -> tuple[int, ...]:
     return tuple(int(word) for word in rng.integers(0, 2**32, 4, dtype=np.uint32))
 
 
-def stream(key: tuple[int, ...], block: int) -> np.random.Generator:
+def stream(key: tuple[int, ...], block: int) -> "np.random.Generator":
     """Generator(SFC64(key, block)): independent for different blocks.
 
     key from `stream_key`, block the index of a block of particles.
@@ -35,7 +35,7 @@ def stream(key: tuple[int, ...], block: int) -> np.random.Generator:
     return np.random.Generator(np.random.SFC64(np.random.SeedSequence(key, spawn_key=(block,))))
 
 
-def box_muller(rng: np.random.Generator, n: int, count: int) -> Noise:
+def box_muller(rng: "np.random.Generator", n: int, count: int) -> Noise:
     """z_1 = r cos(a), z_2 = r sin(a)  with r = sqrt(-2 ln u), u ~ U(0, 1], a ~ U[-pi, pi).
 
     -> (n, count) float32, independent standard normal to |z| = 6.7, where the 32 bits of u end.
@@ -55,7 +55,7 @@ def box_muller(rng: np.random.Generator, n: int, count: int) -> Noise:
     return z.reshape(-1)[: n * count].reshape(n, count)
 
 
-def standard_normal(rng: np.random.Generator, N: int, n: int, *, threads: int | None = None) -> Noise:
+def standard_normal(rng: "np.random.Generator", N: int, n: int, *, threads: int | None = None) -> Noise:
     """z_i ~ N(0, I), i = 1..N.
 
     -> (N, n) float32, each component contiguous.  Depends on rng's state, not on `threads`.  ValueError for a

@@ -72,7 +72,7 @@ def step(
     y: ArrayLike,
     motion: Motion,
     sensor: Sensor,
-    rng: np.random.Generator,
+    rng: "np.random.Generator",
     *,
     resampler: str = "systematic",
     threshold: float = 1.0,
@@ -104,7 +104,7 @@ def run(
     motion: Motion,
     sensor: Sensor,
     n_particles: int | None,
-    rng: np.random.Generator,
+    rng: "np.random.Generator",
     *,
     resampler: str = "systematic",
     threshold: float = 1.0,
@@ -155,7 +155,7 @@ def _step(
     y: ArrayLike,
     motion: Motion,
     sensor: Sensor,
-    rng: np.random.Generator,
+    rng: "np.random.Generator",
     resampler: str,
     threshold: float,
     proposal: str | Proposal,
@@ -211,7 +211,7 @@ def _scale(w: Array, scales: Array, threads: int | None) -> None:
 
 
 def _resample(
-    resampler: str, x: Array, w: Array, rng: np.random.Generator, threads: int | None
+    resampler: str, x: Array, w: Array, rng: "np.random.Generator", threads: int | None
 ) -> tuple[Indices, Array]:
     """ancestors ~ w and x[ancestors], each component contiguous."""
     out = np.empty(x.shape[::-1])
@@ -241,7 +241,7 @@ def _cloud(particles: ArrayLike) -> Array:
     return np.asfortranarray(x)                            # NaN and infinity are looked for block by block
 
 
-def _start(initial: Gaussian | ArrayLike, N: int | None, rng: np.random.Generator, threads: int | None) -> Array:
+def _start(initial: Gaussian | ArrayLike, N: int | None, rng: "np.random.Generator", threads: int | None) -> Array:
     if not isinstance(initial, Gaussian):
         x = _cloud(initial)
         if N not in (None, len(x)):

@@ -19,8 +19,8 @@ from core.linalg import cholesky_psd
 from core.noise import box_muller
 from core.types import Array, Motion, Sensor
 
-Proposal = Callable[[Array, Array, Motion, Sensor, np.random.Generator], tuple[Array, Array]]
-BlockProposal = Callable[[Array, np.random.Generator, Array], Array]
+Proposal = Callable[[Array, Array, Motion, Sensor, "np.random.Generator"], tuple[Array, Array]]
+BlockProposal = Callable[[Array, "np.random.Generator", Array], Array]
 _ROWS = 8192
 
 
@@ -52,7 +52,7 @@ def block_proposal(proposal: str | Proposal, y: Array, motion: Motion, sensor: S
 
 
 def _custom(proposal: Proposal, y: Array, motion: Motion, sensor: Sensor) -> BlockProposal:
-    def draw(x: Array, rng: np.random.Generator, out: Array) -> Array:
+    def draw(x: Array, rng: "np.random.Generator", out: Array) -> Array:
         out[...], log_factor = proposal(x, y, motion, sensor, rng)
         return log_factor
 
@@ -63,7 +63,7 @@ def _prior(y: Array, motion: Motion, sensor: Sensor) -> BlockProposal:
     """g = p(x_k | x_{k-1}): the factor is p(y | x_k)."""
     sampler = motion.sampler() if hasattr(motion, "sampler") else None
 
-    def draw(x: Array, rng: np.random.Generator, out: Array) -> Array:
+    def draw(x: Array, rng: "np.random.Generator", out: Array) -> Array:
         if sampler is None:
             out[...] = motion.sample(x, rng)
         else:
@@ -79,7 +79,7 @@ def _gaussian(name: str, y: Array, motion: Motion, sensor: Sensor) -> BlockPropo
     L = cholesky_psd(motion.Q)
     L = L[:, L.any(axis=0)]
 
-    def draw_rows(x: Array, rng: np.random.Generator, out: Array) -> Array:
+    def draw_rows(x: Array, rng: "np.random.Generator", out: Array) -> Array:
         fx = motion.f(x)
         nu, G, Omega = model(y, fx, L, sensor)
         V = np.linalg.cholesky(Omega)
@@ -94,7 +94,7 @@ def _gaussian(name: str, y: Array, motion: Motion, sensor: Sensor) -> BlockPropo
         log_g = -0.5 * np.square(xi).sum(axis=-1) + np.log(np.diagonal(U, axis1=-2, axis2=-1)).sum(axis=-1)
         return sensor.log_likelihood(y, out) - 0.5 * np.square(e).sum(axis=-1) - log_g
 
-    def draw(x: Array, rng: np.random.Generator, out: Array) -> Array:
+    def draw(x: Array, rng: "np.random.Generator", out: Array) -> Array:
         log_factor = np.empty(len(x))
         for start in range(0, len(x), _ROWS):              # several small matrices for each particle: stay in the cache
             rows = slice(start, start + _ROWS)

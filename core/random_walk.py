@@ -78,7 +78,7 @@ def walk(increments_deg: Array, limit_deg: float = 45.0, reset_deg: float = 40.0
     return Walk(points, headings, reset)
 
 
-def random_walk(n: int, rng: np.random.Generator, runs: tuple[int, ...] = (), spread_deg: float = 5.0) -> Walk:
+def random_walk(n: int, rng: "np.random.Generator", runs: tuple[int, ...] = (), spread_deg: float = 5.0) -> Walk:
     """`walk` with n points and increments d_k ~ U(-spread, spread), for each of `runs`.
 
     KF thesis, appendix A.  ValueError for n < 1.
@@ -118,7 +118,7 @@ def track(ys: Array, setting: Setting) -> Update:
     return run(start(ys[0], setting), ys if setting.start_twice else ys[1:], motion(setting), sensor(setting))
 
 
-def simulate(setting: Setting, rng: np.random.Generator, n: int = 100, runs: tuple[int, ...] = ()) -> Simulation:
+def simulate(setting: Setting, rng: "np.random.Generator", n: int = 100, runs: tuple[int, ...] = ()) -> Simulation:
     """A walk of n points, its measurements and the filter's answer, for each of `runs`.
 
     KF thesis chapter 4.

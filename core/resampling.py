@@ -142,7 +142,7 @@ RESAMPLERS: dict[str, Callable[..., Indices]] = {
 }
 
 
-def draw(name: str, w: ArrayLike, rng: np.random.Generator, *, threads: int | None = None) -> Indices:
+def draw(name: str, w: ArrayLike, rng: "np.random.Generator", *, threads: int | None = None) -> Indices:
     """ancestors ~ the resampling method called `name`, its uniforms drawn from rng.
 
     w (N,) normalised weights -> ancestors (N,).  `systematic` takes one number from rng, the others N.  ValueError for

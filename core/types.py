@@ -53,5 +53,5 @@ class Motion(Protocol):
     def jacobian(self, x: Array) -> Array:
         """df/dx, shape (..., n, n)."""
 
-    def sample(self, x: Array, rng: np.random.Generator) -> Array:
+    def sample(self, x: Array, rng: "np.random.Generator") -> Array:
         """One draw of x_k for each x_{k-1}, shape (..., n)."""

@@ -40,7 +40,7 @@ class Doors(NamedTuple):
 
 
 def reflect(
-    polygon: ArrayLike, position: ArrayLike, heading_rad: ArrayLike, distance_m: ArrayLike, rng: np.random.Generator
+    polygon: ArrayLike, position: ArrayLike, heading_rad: ArrayLike, distance_m: ArrayLike, rng: "np.random.Generator"
 ) -> Reflected:
     """p + s [cos a, sin a], with specular reflection of the rest of the way and of the heading at every wall.
 
@@ -167,7 +167,7 @@ def _bounce(w: Walkers, i: Numbers, normal: Array) -> Numbers:
     return _give_up(i, w.bounces, w.heading, w.rng)
 
 
-def _give_up(i: Numbers, count: Numbers, heading: Array, rng: np.random.Generator) -> Numbers:
+def _give_up(i: Numbers, count: Numbers, heading: Array, rng: "np.random.Generator") -> Numbers:
     """Those of i that have not been reflected too often; the others get a new heading."""
     stuck = count[i] >= MOST_REFLECTIONS
     if stuck.any():

@@ -41,7 +41,7 @@ class Cloud(NamedTuple):
     held: NDArray[np.bool_]
 
 
-def scatter(graph: FloorGraph, N: int, rng: np.random.Generator, walk: Walk | None = None) -> Cloud:
+def scatter(graph: FloorGraph, N: int, rng: "np.random.Generator", walk: Walk | None = None) -> Cloud:
     """Uniform over the total length (areas by equivalent length), uniform direction, v ~ U(start speeds).
 
     N particles on the whole map: where a filter starts that knows nothing.  GBPF algorithm, step 1 (ours).

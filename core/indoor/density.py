@@ -112,7 +112,7 @@ def straighten(graph: FloorGraph, links: tuple[Id, ...]) -> Array:
     return np.array(rows)
 
 
-def sample_measure(graph: FloorGraph, measure: MixedMeasure, N: int, rng: np.random.Generator) -> tuple[Array, Array]:
+def sample_measure(graph: FloorGraph, measure: MixedMeasure, N: int, rng: "np.random.Generator") -> tuple[Array, Array]:
     """N darts: with probability c_A uniform in an area, else uniform on a link.
 
     -> positions (N, 2) in metres, and the numbers (N,) of their objects in `FloorGraph.object_ids`.

@@ -73,7 +73,7 @@ class Step(NamedTuple):
     recovered: Numbers
 
 
-def start(graph: FloorGraph, N: int, rng: np.random.Generator, walk: Walk | None = None) -> Belief:
+def start(graph: FloorGraph, N: int, rng: "np.random.Generator", walk: Walk | None = None) -> Belief:
     """N equally weighted particles, uniform over the total length of the map: nothing is known.  GBPF 5.4, step 1."""
     return Belief(scatter(graph, N, rng, walk), np.full(N, -math.log(N)))
 
@@ -83,7 +83,7 @@ def step(
     belief: Belief,
     y: ArrayLike | None,
     points: AccessPoints,
-    rng: np.random.Generator,
+    rng: "np.random.Generator",
     *,
     dt_s: float = 1.0,
     walk: Walk | None = None,
@@ -148,7 +148,7 @@ def _check(graph: FloorGraph, belief: Belief, points: AccessPoints, threshold: f
 
 
 def _scatter_some(
-    graph: FloorGraph, cloud: Cloud, log_w: Array, share: float, walk: Walk, rng: np.random.Generator
+    graph: FloorGraph, cloud: Cloud, log_w: Array, share: float, walk: Walk, rng: "np.random.Generator"
 ) -> tuple[Cloud, Array, Numbers]:
     """(1 - share) p + share u: a resampled cloud of which some particles are scattered over the map."""
     N = len(log_w)

@@ -34,7 +34,7 @@ class Moved(NamedTuple):
     choices: Choices
 
 
-def advance(graph: FloorGraph, cloud: Cloud, dt_s: float, walk: Walk, rng: np.random.Generator) -> Moved:
+def advance(graph: FloorGraph, cloud: Cloud, dt_s: float, walk: Walk, rng: "np.random.Generator") -> Moved:
     """x_t ~ P_x(x_t | x_{t-1}): every particle walks v dt along links and across areas, choosing at the nodes.
 
     On a link: offset += direction v t; what is left over at the end is walked on the next object, as often as needed.

@@ -124,10 +124,12 @@ def _known(n: Any, ids: set[Any]) -> Id:
 
 
 def either(d: Mapping[str, Any], name: str) -> Any:
+    """d[name_m], or d[name] where the unit is left out."""
     return d.get(f"{name}_m", d.get(name))
 
 
 def positive(name: str, value: Any) -> float:
+    """value as a length in metres; Problem unless it is positive and within reason."""
     number = _number(value)
     if not SHORTEST_M <= number <= _FARTHEST_M:
         raise Problem(f"expected a {name.replace('_', ' ')} of at least {SHORTEST_M:g} m, got {number:g}")
@@ -161,5 +163,6 @@ def _is_list(value: Any) -> bool:
 
 
 def short(value: Any) -> str:
+    """value as text for a message, cut where it is long."""
     text = repr(value)
     return text if len(text) <= 60 else text[:57] + "..."

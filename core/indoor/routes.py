@@ -120,7 +120,7 @@ def walk_route(
     return Truth(time, position, floor, o, legs, float(sum(leg.length_m for leg in legs)))
 
 
-def random_stops(graph: FloorGraph, count: int, rng: np.random.Generator) -> list[Id]:
+def random_stops(graph: FloorGraph, count: int, rng: "np.random.Generator") -> list[Id]:
     """`count` nodes to visit, no two in a row the same: dead ends (rooms) if the map has two, else any nodes."""
     ends = [n for n in graph.nodes if len(graph.objects_at(n)) == 1]
     choices = ends if len(ends) >= 2 else list(graph.nodes)

@@ -9,7 +9,7 @@ from core.types import Array
 
 
 def simulate_scans(
-    truth: Truth, points: AccessPoints, rng: np.random.Generator, *, interval_s: float = 1.0
+    truth: Truth, points: AccessPoints, rng: "np.random.Generator", *, interval_s: float = 1.0
 ) -> Array:
     """y_a = mu_a(x) + w,  w ~ N(0, sigma_a^2), every interval_s from t = 0 on; NaN between scans and below threshold.
 

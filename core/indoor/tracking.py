@@ -43,7 +43,7 @@ def run(
     graph: FloorGraph,
     scans: ArrayLike,
     points: AccessPoints,
-    rng: np.random.Generator,
+    rng: "np.random.Generator",
     *,
     n_particles: int = 500,
     belief: Belief | None = None,

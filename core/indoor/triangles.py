@@ -27,7 +27,7 @@ def triangulate(polygon: ArrayLike) -> Array:
     return np.array([*triangles, ring])
 
 
-def sample_in(triangles: Array, size: int, rng: np.random.Generator) -> Array:
+def sample_in(triangles: Array, size: int, rng: "np.random.Generator") -> Array:
     """x = a + r (b - a) + s (c - a),  (r, s) uniform on r + s <= 1, the triangle drawn by its area.
 
     triangles (K, 3, 2) -> (size, 2), uniform on their union.
@@ -42,7 +42,7 @@ def sample_in(triangles: Array, size: int, rng: np.random.Generator) -> Array:
     return a[k] + r[:, None] * u[k] + s[:, None] * v[k]
 
 
-def sample_polygon(polygon: ArrayLike, size: int, rng: np.random.Generator) -> Array:
+def sample_polygon(polygon: ArrayLike, size: int, rng: "np.random.Generator") -> Array:
     """size points, uniform in a simple polygon (V, 2) -> (size, 2)."""
     return sample_in(triangulate(polygon), size, rng)
 

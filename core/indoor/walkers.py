@@ -20,7 +20,7 @@ class Walkers:
     (N,): reflections so far, empty on a map without areas.
     """
 
-    def __init__(self, c: Cloud, dt_s: float, graph: FloorGraph, walk: Walk, rng: np.random.Generator) -> None:
+    def __init__(self, c: Cloud, dt_s: float, graph: FloorGraph, walk: Walk, rng: "np.random.Generator") -> None:
         N = len(c.object)
         self.object, self.offset, self.direction = c.object.copy(), c.offset_m.copy(), c.direction.copy()
         self.position = np.array(c.position_m.T, order="C").T

@@ -204,8 +204,8 @@ def _figures(p: "Params", r: "Result", k: int) -> dict[str, "go.Figure"]:
             fig.markers("real", s.scale[::2], s.real[::2].sum(axis=1), "monte_carlo", size=6),
             cursor=float(s.scale[k]), marks=[1.0]),
         "perturbed": fig.chart(
+            fig.markers("short", o.price, o.short, "warning", size=4, symbol="square"),
             fig.line("joseph", o.price[order], o.joseph[order], "posterior"),
-            fig.markers("real", o.price[order[::3]], o.real[order[::3]], "monte_carlo", size=6),
-            fig.markers("short", o.price, o.short, "warning", size=5, symbol="square")),
+            fig.markers("real", o.price[order[::3]], o.real[order[::3]], "monte_carlo", size=6)),
         "trust": fig.chart(*trust, cursor=1.0, log_x=True, y_range=(0.0, 1.0)),
     }
