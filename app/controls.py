@@ -24,6 +24,7 @@ class Controls:
         self._parameters = parameters
         self._widgets: dict[str, Any] = {}
         self._roots: list[Any] = []
+        self._folders: list[tuple[Any, set[str]]] = []
         current = values(params)
         groups: dict[str, list[Parameter]] = {}
         for parameter in parameters.values():
@@ -32,6 +33,7 @@ class Controls:
             if group:
                 folder = gui.add_folder(words.label("groups", group), expand_by_default=at < 2)
                 self._roots.append(folder)
+                self._folders.append((folder, {p.name for p in members}))
                 with folder:
                     self._add_all(members, current)
             else:
@@ -44,6 +46,8 @@ class Controls:
 
     def show(self, params: Any, unused: Collection[str] = ()) -> None:
         """Set the widgets to these parameters and hide the unused ones; only what differs is sent."""
+        for folder, members in self._folders:
+            folder.visible = not members <= set(unused)
         for name, value in values(params).items():
             parameter, widget = self._parameters[name], self._widgets[name]
             widget.visible = name not in unused

@@ -161,8 +161,13 @@ def exits(edges: Border, p: Array, q: Array, a: NDArray[np.intp] | None = None) 
     """
     to = (slice(None), None) if a is None else (slice(None), a)
     nx, ny, c = edges.normal[..., 0][to], edges.normal[..., 1][to], edges.offset[to]
-    s0 = nx * p[:, 0] + ny * p[:, 1] - c                  # (E, M): the long axis last
-    s1 = nx * q[:, 0] + ny * q[:, 1] - c
+    (px, py), (qx, qy) = p.T.copy(), q.T.copy()
+    s0 = nx * px                                          # (E, M): the long axis last, and contiguous
+    s0 += ny * py
+    s0 -= c
+    s1 = nx * qx
+    s1 += ny * qy
+    s1 -= c
     edge, segment = ((s1 > 0.0) & (s0 <= SLACK_M) & (s1 > s0)).nonzero()
     if not len(segment):
         return Crossings(segment, edge, np.empty(0))

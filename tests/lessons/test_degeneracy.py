@@ -47,10 +47,9 @@ def test_sis_ends_on_one_particle_and_sir_does_not():
 
 
 def test_it_is_no_accident_of_the_seed():
-    ends = np.array([[f.n_eff[-1] for f in (result(replace(DEFAULT, seed=s)).sis, result(replace(DEFAULT, seed=s)).sir)]
-                     for s in range(6)])
-    assert np.median(ends[:, 0]) < 3.0 and (ends[:, 0] < 8.0).all()
-    assert np.median(ends[:, 1]) > 12.0
+    runs = [result(replace(DEFAULT, seed=s)) for s in range(6)]
+    assert all(r.sis.n_eff[-1] < 3.0 for r in runs)
+    assert all(r.sir.n_eff[1:].mean() > 10.0 for r in runs)
 
 
 def test_resampling_costs_ancestors():
