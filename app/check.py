@@ -57,12 +57,12 @@ def check(entry: Entry) -> Iterator[Problem]:
             continue
         if name == "default" and (spent := time.perf_counter() - started) > 4 * lesson.budget_s:
             yield Problem(entry.id, f"compute took {spent:.1f} s at the default, its budget is {lesson.budget_s:g} s")
-        for moment in moments(entry, scenario):
+        for k, moment in enumerate(moments(entry, scenario)):
             at = scenarios.with_moment(scenario, entry, *moment)
             try:
                 view = lesson.view(at.params, result, at.moment)
                 seen.add(view)
-                found = list(view_problems(view, at, entry, words))
+                found = list(view_problems(view, at, entry, words, thorough=k == 0))
             except Exception as error:
                 found = [f"view raised {type(error).__name__}: {error}"]
             yield from (Problem(entry.id, f"{name}, step {at.moment.step}, stage {at.moment.stage}: {text}")
@@ -131,11 +131,11 @@ def moments(entry: Entry, scenario: Scenario) -> list[tuple[int, int]]:
     return sorted(found | {(shown.step, k) for k in range(len(timeline.stages))})
 
 
-def view_problems(view: View, scenario: Scenario, entry: Entry, words: Words) -> Iterator[str]:
-    """What is wrong with one view: numbers, names, data."""
+def view_problems(view: View, scenario: Scenario, entry: Entry, words: Words, thorough: bool = True) -> Iterator[str]:
+    """What is wrong with one view: numbers and names; if thorough, also in the dark and as JSON (slow)."""
     yield from (f"unused names {name!r}, which is no parameter"
                 for name in entry.lesson.unused_at(scenario.params) if name not in entry.parameters)
-    for theme in (LIGHT, DARK):
+    for theme in (LIGHT, DARK) if thorough else (LIGHT,):
         for primitive in lower(view, style_for(view.camera, theme)):
             for key, value in primitive.props.items():
                 if isinstance(value, np.ndarray) and value.dtype.kind == "f" and not np.isfinite(value).all():

@@ -14,8 +14,8 @@ FORMATS = ("svg", "pdf", "png", "html")
 def write(figure: go.Figure, path: Path, size: tuple[int, int]) -> None:
     """Write the figure to `path`, in the format of its ending; RuntimeError when a tool for it is missing."""
     kind = path.suffix[1:].lower()
-    if kind == "html":
-        path.write_text(figure.to_html(config=CONFIG, include_plotlyjs=True), encoding="utf-8")
+    if kind == "html":  # to_html takes entries out of the config that it is given
+        path.write_text(figure.to_html(config=dict(CONFIG), include_plotlyjs=True), encoding="utf-8")
         return
     try:
         import kaleido  # noqa: F401

@@ -6,7 +6,7 @@ import numpy as np
 
 from core import grid
 from core.types import Array
-from lessons.filtering._unscented_panels import Panel
+from lessons.filtering._panels import Panel
 from lessons.kit import figures as fig
 from lessons.kit.equations import Equation, Piece
 from lessons.kit.lesson import Moment, Readout, View

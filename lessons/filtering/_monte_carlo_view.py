@@ -6,7 +6,7 @@ import numpy as np
 
 from core.types import Array, Gaussian
 from lessons.filtering import _monte_carlo_problems as problems
-from lessons.filtering._unscented_panels import Panel
+from lessons.filtering._panels import Panel
 from lessons.kit import figures as fig
 from lessons.kit.equations import Equation, Piece
 from lessons.kit.lesson import Moment, Readout, View

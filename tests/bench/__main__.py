@@ -6,4 +6,4 @@ from pathlib import Path
 import pytest
 
 if __name__ == "__main__":
-    sys.exit(pytest.main([str(Path(__file__).parent), "--quiet", "--no-header", *sys.argv[1:]]))
+    sys.exit(pytest.main([str(Path(__file__).parent), "-m", "bench", "--quiet", "--no-header", *sys.argv[1:]]))

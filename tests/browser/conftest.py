@@ -41,7 +41,7 @@ def new_visit(browser: Browser, app: App) -> Iterator[NewVisit]:
     """Makes pages, each in a fresh context.  Afterwards: no error in any console, no request to anywhere else."""
     visits: list[Visit] = []
 
-    def make(server: App = app, width: int = 1400, height: int = 900) -> Visit:
+    def make(server: App = app, width: int = 1200, height: int = 800) -> Visit:
         context = browser.new_context(viewport={"width": width, "height": height}, accept_downloads=True)
         context.route(OUTSIDE, lambda route: route.abort())
         visits.append(Visit(server, context.new_page()))
@@ -57,5 +57,5 @@ def new_visit(browser: Browser, app: App) -> Iterator[NewVisit]:
 
 @pytest.fixture
 def visit(new_visit: NewVisit) -> Visit:
-    """One page at the size of a laptop's window."""
+    """One page in a window of a small laptop: larger ones take longer to render."""
     return new_visit()

@@ -24,6 +24,7 @@ class Computed(NamedTuple):
     scenario: Scenario
     result: Any
     seconds: float
+    work_seconds: float          # of this thread, however busy the machine is
     progress: list[float]
 
 
@@ -32,9 +33,9 @@ def default(lesson: str) -> Computed:
     """The default scenario of a lesson, computed once for all tests here."""
     entry, progress = ALL[lesson], []
     scenario = scenarios.default(entry)
-    begun = time.perf_counter()
+    begun, work = time.perf_counter(), time.thread_time()
     result = entry.lesson.compute(scenario.params, progress.append)
-    return Computed(scenario, result, time.perf_counter() - begun, progress)
+    return Computed(scenario, result, time.perf_counter() - begun, time.thread_time() - work, progress)
 
 
 def shown(entry: Entry, at: Moment, result: Any) -> str:
@@ -93,7 +94,7 @@ def test_a_long_computation_can_be_cancelled(entry):
     computed = default(entry.id)
     assert all(0.0 <= fraction <= 1.0 for fraction in computed.progress)
     assert computed.progress == sorted(computed.progress)
-    assert computed.progress or computed.seconds < 0.2
+    assert computed.progress or computed.work_seconds < 0.2
 
     def stop(fraction: float) -> None:
         raise Cancelled

@@ -206,7 +206,7 @@ def test_disc_and_polygon_overlap_as_darts_say(seed):
     x = sample_polygon(P, 4000, rng)
     share = (np.square(x - c).sum(axis=1) <= r * r).mean()
     assert 0.0 <= area <= min(np.pi * r * r, signed_area(P)) + 1e-9
-    p = area / signed_area(P)
+    p = min(area / signed_area(P), 1.0)                   # rounding may leave it a hair above
     assert abs(share - p) <= 5.5 * np.sqrt(p * (1 - p) / 4000) + 1e-3     # false alarm below 1e-6 for the whole test
     assert disc_area_in_polygon(P[::-1], c, r) == pytest.approx(area, abs=1e-9)
 
