@@ -53,10 +53,15 @@ class Transport:
 
     def rebuild(self, timeline: Timeline, words: Words) -> None:
         """Widgets for another timeline: the scrubber's range and the names of the stages."""
+        names = [words.label("stages", stage) for stage in timeline.stages]
+        before, self._timeline = (self._timeline.steps, self._stage_names), timeline
+        if before == (timeline.steps, names):
+            return  # only the scale differs: widgets that the user may hold stay, and `show` changes the label
+        self._stage_names = names
         for widget in (self._scrubber, self._stages):
             if widget is not None:
                 widget.remove()
-        self._timeline, self._scrubber, self._stages = timeline, None, None
+        self._scrubber, self._stages = None, None
         if timeline.steps > 0:
             self._scrubber = self._gui.add_slider(self._label(), 0, timeline.steps, 1, 0)
 
@@ -67,9 +72,7 @@ class Transport:
 
             self._scrubber.on_update(scrubbed)
         if len(timeline.stages) > 1:
-            names = [words.label("stages", stage) for stage in timeline.stages]
             self._stages = self._gui.add_button_group("Stage", tuple(names))
-            self._stage_names = names
 
             async def chosen(event: Any) -> None:
                 if event.client is not None and self._stages.value in names:

@@ -7,8 +7,6 @@ from core.indoor import AccessPoints, Walk, office_building, start, step
 from tests.bench import at_most, faster, medians
 from tests.bench.indoor_loop import Loop, Walker
 
-pytestmark = pytest.mark.bench
-
 GRAPH = office_building()
 POINTS = AccessPoints([[5, 3], [20, -3], [40, 3], [55, -3], [30, 15], [70, 0], [10, 3], [45, -3]],
                       floor=[0, 0, 0, 0, 1, 0, 1, 1])
@@ -66,6 +64,7 @@ def test_the_loop_does_the_same_step():
     np.testing.assert_allclose([loop.log_likelihood(w, Y) for w in still[:200]], want[:200], rtol=1e-9)
 
 
+@pytest.mark.bench
 def test_step():
     belief, rng = spread(N), np.random.default_rng(2)
     loop, some = Loop(GRAPH, POINTS, WALK, 3), walkers(belief.cloud)[::PART]

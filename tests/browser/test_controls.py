@@ -30,11 +30,16 @@ def test_slider_by_keyboard_changes_numbers_plot_and_picture(visit: Visit) -> No
 def test_slider_by_mouse_changes_plot_and_picture(visit: Visit) -> None:
     visit.open("lesson=background.rotation_vector", drawn=False)
     before, plot = visit.canvas(), visit.plot()
+    scrubber = visit.page.get_by_role("textbox", name="φ =")
+    widget = scrubber.get_attribute("id")
     box = visit.slider("Angle").bounding_box()
     assert box is not None
     x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
     visit.drag((x, y), (x + 30, y))
     visit.shows(lambda s: s.params.angle_deg > 150, "a larger angle")
+    angle = visit.scenario.params.angle_deg
+    visit.page.get_by_text(f"φ = {angle:g} °", exact=True).first.wait_for()
+    assert scrubber.get_attribute("id") == widget, "the timeline's other unit leaves its widget where it is"
     assert difference(before, visit.canvas()) > 0.005
     visit.until(lambda: visit.plot() != plot, "the plot")
 

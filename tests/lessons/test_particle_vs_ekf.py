@@ -85,7 +85,7 @@ def test_without_resampling_the_weights_collapse():
     cloud = next(i for i in shown(preset("SIS: no resampling")).scene if i.name == "cloud")
     assert cloud.weights.sum() > 0.9
     assert cloud.weights.max() > 0.3
-    assert "others that carry more than" in shown(preset("SIS: no resampling")).note
+    assert "more that each carry over" in shown(preset("SIS: no resampling")).note
 
 
 def test_few_particles_lose_a_mode():
