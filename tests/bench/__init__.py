@@ -1,6 +1,6 @@
 """Speed, as ratios against references measured in the same run.
 
-`make bench` prints one table; an ordinary test run checks the same targets.
+`make bench` checks the targets and prints one table; an ordinary test run leaves them out, as they need idle cores.
 """
 
 import gc
