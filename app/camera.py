@@ -46,15 +46,12 @@ class Pose:
 
     def wxyz(self) -> np.ndarray:
         """The orientation as a quaternion: looking along +z, down is +y (OpenCV)."""
-        from core.rotation import rotation_vector_from_dcm
+        from core.rotation import quaternion_from_dcm
 
         forward = np.subtract(self.look_at, self.position) / self.distance
         right = np.cross(forward, self.up)
         right /= np.sqrt(right @ right)
-        p = rotation_vector_from_dcm(np.stack([right, np.cross(forward, right), forward], axis=1))
-        angle = float(np.sqrt(p @ p))
-        axis = p / angle if angle > 0 else p
-        return np.array([math.cos(angle / 2), *(math.sin(angle / 2) * axis)])
+        return quaternion_from_dcm(np.stack([right, np.cross(forward, right), forward], axis=1))
 
 
 @dataclass(frozen=True, slots=True)

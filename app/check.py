@@ -190,12 +190,6 @@ def word_problems(entry: Entry, words: Words, seen: Seen) -> Iterator[str]:
             yield str(error)
 
 
-def default_result(entry: Entry) -> tuple[Scenario, Any]:
-    """The default scenario and its result."""
-    base = scenarios.default(entry)
-    return base, entry.lesson.compute(base.params, no_progress)
-
-
 def overview(entry: Entry) -> dict[str, Any]:
     """What `paikka list --json` prints of one lesson."""
     words = entry.words()
