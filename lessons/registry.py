@@ -19,15 +19,24 @@ from lessons.kit.words import Words
 log = logging.getLogger(__name__)
 
 CHAPTERS: dict[str, tuple[str, ...]] = {
-    "background": ("rotation_vector",),
-    "static": (),
+    "background": (
+        "matrix_root", "least_squares", "normal_distribution", "independence", "sample_mean", "chi_square",
+        "conditioning", "rotation_vector", "rotation_order", "geodetic", "rotating_frames", "attitude_rate",
+    ),
+    "static": (
+        "measurement_surfaces", "closed_form", "gauss_newton", "dilution_of_precision", "garbage_measurements",
+        "likelihood", "bayes", "confidence", "fingerprint", "gnss_fix",
+    ),
     "filtering": (
         "constant_velocity", "kalman", "innovation", "extended", "unscented", "nonlinear_compared",
-        "bayes_filter", "monte_carlo", "degeneracy", "resampling", "particle_vs_ekf", "filter_lab",
+        "bayes_filter", "monte_carlo", "degeneracy", "resampling", "particle_vs_ekf", "mixture", "multiple_models",
+        "filter_lab",
     ),
     "bayes_kalman": ("bayes_theorem", "map_and_mmse", "gain", "random_walk"),
-    "indoor": (),
+    "indoor": ("floor_graph", "link_choice", "signal_strength", "graph_filter", "convergence"),
 }
+CHAPTERS = {chapter: tuple(n for n in names if (Path(__file__).parent / chapter / f"{n}.py").exists())  # WIP
+            for chapter, names in CHAPTERS.items()}
 
 CHAPTER_NAMES: dict[str, dict[str, str]] = {
     "en": {

@@ -6,10 +6,10 @@ import numpy as np
 
 from core import grid
 from core.types import Array
-from lessons.filtering._panels import Panel
 from lessons.kit import figures as fig
 from lessons.kit.equations import Equation, Piece
 from lessons.kit.lesson import Moment, Readout, View
+from lessons.kit.panels import Panel
 from lessons.kit.roles import Role
 from lessons.kit.scene import Item, Label, Orbit, Plane, Points, Polyline, Segments, Stations, Surface
 

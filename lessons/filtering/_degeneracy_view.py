@@ -5,10 +5,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from core.types import Array
-from lessons.filtering._panels import Panel
 from lessons.kit import figures as fig
 from lessons.kit.equations import Equation, Piece
 from lessons.kit.lesson import Moment, Readout, View
+from lessons.kit.panels import Panel
 from lessons.kit.scene import Item, Particles, Plane, Points, Polygon, Polyline, Segments
 
 if TYPE_CHECKING:

@@ -6,10 +6,10 @@ import numpy as np
 
 from core.types import Array, Gaussian
 from lessons.filtering import _monte_carlo_problems as problems
-from lessons.filtering._panels import Panel
 from lessons.kit import figures as fig
 from lessons.kit.equations import Equation, Piece
 from lessons.kit.lesson import Moment, Readout, View
+from lessons.kit.panels import Panel
 from lessons.kit.scene import HeatMap, Item, LevelEllipse, Particles, Plane, Points, Polygon, Polyline
 
 if TYPE_CHECKING:

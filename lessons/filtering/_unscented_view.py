@@ -7,9 +7,10 @@ import numpy as np
 from core.gaussian import chi_square_level, ellipse
 from core.types import Array, Gaussian
 from lessons.filtering._unscented_figures import equations, figures, readouts
+from lessons.filtering._unscented_layout import TITLES, Layout, layout
 from lessons.filtering._unscented_maps import map_of
-from lessons.filtering._panels import TITLES, Layout, Panel, layout
 from lessons.kit.lesson import Moment, View
+from lessons.kit.panels import Panel
 from lessons.kit.roles import Role
 from lessons.kit.scene import Item, Label, LevelEllipse, Points, Polyline, Segments, Stations
 

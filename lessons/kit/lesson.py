@@ -73,13 +73,24 @@ class Readout:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Target:
+    """A place in the scene that can be clicked: the click sets `changes` (parameter names to values).
+
+    Of several the one nearest to the pointer counts, within 18 pixels of it.
+    """
+
+    position: Sequence[float]
+    changes: Mapping[str, Any]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class View:
     """Everything that is shown at one moment, as plain data.
 
     scene: what the 3-D window draws; camera: what it must show (depends on the result, not on the moment, so that
     it stands still in time).  figures: plotly figures by id.  equations: the algorithm's lines with this moment's
     numbers in them.  caption: a short line over the scene ("t = 12 s").  note: a sentence that the user must know
-    ("2,000 of 1,000,000 particles are drawn").
+    ("2,000 of 1,000,000 particles are drawn").  targets: what can be clicked.
     """
 
     scene: Sequence[Item]
@@ -89,6 +100,7 @@ class View:
     equations: Sequence[Equation] = ()
     caption: str = ""
     note: str = ""
+    targets: Sequence[Target] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,0 +1,1 @@
+"""Lessons on indoor positioning with a floor graph: the GBPF thesis."""

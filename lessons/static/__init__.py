@@ -1,0 +1,1 @@
+"""Lessons on static positioning: MAT chapter 2."""
