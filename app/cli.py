@@ -49,6 +49,7 @@ def _parser() -> argparse.ArgumentParser:
     serve.add_argument("--host", default="127.0.0.1", help="address to listen on (default: only this machine)")
     serve.add_argument("--port", type=_port, default=8080, help="port; the next free one if it is taken")
     serve.add_argument("--lesson", metavar="ID", help="the lesson that opens first")
+    _file_option(serve)
     serve.add_argument("--no-open", action="store_true", help="do not open a browser")
     serve.add_argument("--allow-host", action="append", default=[], metavar="NAME",
                        help="a name under which other machines may ask for this server; may be repeated")
@@ -72,7 +73,14 @@ def _parser() -> argparse.ArgumentParser:
 
     check = command("check", commands.check, "Run every lesson at default, presets and limits; print what is wrong.")
     check.add_argument("--json", action="store_true", help="as JSON")
+    check.add_argument("--map", "--data", action="append", default=[], type=Path, metavar="FILE", dest="files",
+                       help="check this file instead of the lessons; may be repeated")
     return parser
+
+
+def _file_option(parser: argparse.ArgumentParser) -> None:
+    parser.add_argument("--data", "--map", action="append", default=[], type=Path, metavar="FILE", dest="files",
+                        help="a file for the lessons that take one: a map, measurements; may be repeated")
 
 
 def _scenario_options(parser: argparse.ArgumentParser) -> None:
@@ -80,6 +88,7 @@ def _scenario_options(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", dest="changes",
                         help="a parameter; may be repeated")
     parser.add_argument("--preset", metavar="NAME", help="start from this preset")
+    _file_option(parser)
     parser.add_argument("--step", type=int, metavar="K", help="the step of the timeline")
     parser.add_argument("--stage", metavar="NAME", help="the stage within the step")
 

@@ -15,6 +15,7 @@ from pygments.formatters import HtmlFormatter
 from pygments.lexers import PythonLexer
 
 from app.scenario import Scenario
+from lessons.kit import files
 from lessons.kit.params import values
 from lessons.registry import Entry
 
@@ -38,10 +39,15 @@ def script(entry: Entry, scenario: Scenario) -> str:
     else:
         load = (f"import runpy\n\nLESSON = runpy.run_path({str(entry.path.name)!r})[\"LESSON\"]"
                 "  # run this in the lesson's folder")
+    loaded = [files.get(str(value)) for name, value in values(scenario.params).items()
+              if entry.parameters[name].kind == "file" and value]
     given = "".join(f"    {name}={value!r},\n" for name, value in values(scenario.params).items())
     return (f'"""{entry.words().title}: the numbers of one scenario."""\n\n'
             f"{load}\n"
+            f"{'from lessons.kit import files' + chr(10) if loaded else ''}"
             "from lessons.kit.lesson import Moment, no_progress\n\n"
+            + "".join(f"files.put({f.name!r}, open({f.name!r}, \"rb\").read())  # the loaded file, beside this script\n"
+                      for f in loaded) +
             f"p = LESSON.Params(\n{given})\n"
             "result = LESSON.compute(p, no_progress)\n"
             f"view = LESSON.view(p, result, Moment(step={scenario.moment.step}, stage={scenario.moment.stage}))\n"

@@ -123,6 +123,8 @@ def export(options: argparse.Namespace) -> int:
 def check(options: argparse.Namespace) -> int:
     from app.check import check_all
 
+    if options.files:
+        return _check_files(options)
     problems = list(check_all(_registry(options)))
     wrong = [p for p in problems if not p.translation]
     if options.json:
@@ -137,11 +139,35 @@ def check(options: argparse.Namespace) -> int:
     return 1 if wrong else 0
 
 
+def _check_files(options: argparse.Namespace) -> int:
+    """Say of each file whether lessons can use it."""
+    from app import given
+
+    registry, wrong = _registry(options), 0
+    for path in options.files:
+        try:
+            kind, _ = given.read(path, registry)
+        except ValueError as error:
+            wrong += 1
+            print(error)
+        else:
+            print(f"{path}: {kind}, and all is well with it.")
+    return 1 if wrong else 0
+
+
 def _registry(options: argparse.Namespace) -> Registry:
+    from app import given
+
     try:
-        return Registry(options.lessons)
+        registry = Registry(options.lessons)
     except ValueError as error:
         raise UsageError(f"--lessons: {error}") from None
+    if options.command is check or not getattr(options, "files", []):
+        return registry
+    try:
+        return Registry(options.lessons, dict(given.read(path, registry) for path in options.files))
+    except ValueError as error:
+        raise UsageError(f"--data: {error}") from None
 
 
 def _entry(registry: Registry, lesson_id: str, option: str) -> Entry:

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from app.uploads import FileControl
 from app.web.adapter import widget_id
 from lessons.kit.params import SEED_LIMIT, Parameter, Value, values
 from lessons.kit.words import Words
@@ -17,12 +18,14 @@ class Controls:
     """The widgets of one lesson in the current container of `gui`."""
 
     def __init__(self, gui: Any, parameters: Mapping[str, Parameter], words: Words, params: Any,
-                 change: Change) -> None:
+                 change: Change, notify: Callable[[str, str], None]) -> None:
         self._gui = gui
+        self._notify = notify
         self._words = words
         self._change = change
         self._parameters = parameters
         self._widgets: dict[str, Any] = {}
+        self._shorten: dict[str, Any] = {}    # buttons below a list of points or names
         self._roots: list[Any] = []
         self._folders: list[tuple[Any, set[str]]] = []
         current = values(params)
@@ -51,12 +54,16 @@ class Controls:
         for name, value in values(params).items():
             parameter, widget = self._parameters[name], self._widgets[name]
             widget.visible = name not in unused
+            if name in self._shorten:
+                self._shorten[name].visible = name not in unused
             if parameter.log:
                 if _from_log(parameter, widget.value) != value:
                     widget.value = _to_log(float(value))  # type: ignore[arg-type]
                 widget.label = self._label(parameter, value)
             elif parameter.kind == "choice":
                 widget.value = self._words.option(name, str(value))
+            elif parameter.kind in ("points", "names"):
+                widget.value = parameter.format(value)
             else:
                 widget.value = value
 
@@ -72,7 +79,11 @@ class Controls:
             widget = self._add(parameter, current[parameter.name])
             self._widgets[parameter.name] = widget
             made.append(widget)
-            self._listen(parameter, widget)
+            if parameter.kind in ("points", "names"):
+                self._shorten[parameter.name] = self._list_buttons(parameter, widget)
+                made.append(self._shorten[parameter.name])
+            elif parameter.kind != "file":
+                self._listen(parameter, widget)
             if parameter.kind == "seed":
                 made.append(self._new_seed_button(parameter))
         return made
@@ -90,6 +101,10 @@ class Controls:
                 add = self._gui.add_vector2 if len(value) == 2 else self._gui.add_vector3
                 n = len(value)
                 return add(label, value, min=(p.low,) * n, max=(p.high,) * n, step=p.step or _nice_step(p), hint=hint)
+            case "points" | "names":
+                return self._gui.add_text(label, p.format(value), disabled=True, hint=hint)
+            case "file":
+                return FileControl(self._gui, p, label, hint, value, self._change, self._notify)
             case "seed":
                 return self._gui.add_number(label, value, min=0, max=SEED_LIMIT, step=1, hint=hint)
         if p.log:
@@ -121,6 +136,19 @@ class Controls:
             self._change({parameter.name: parameter.nearest(value)})
 
         widget.on_update(changed)
+
+    def _list_buttons(self, parameter: Parameter, widget: Any) -> Any:
+        """A list grows by clicks into the scene; here it gets shorter."""
+        last, all_ = (self._words.label("buttons", name).capitalize() for name in ("remove last", "remove all"))
+        buttons = self._gui.add_button_group("", (last, all_))
+
+        async def shorten(event: Any) -> None:
+            if event.client is not None:
+                items: Any = parameter.parse(widget.value)
+                self._change({parameter.name: items[:-1] if buttons.value == last else ()})
+
+        buttons.on_click(shorten)
+        return buttons
 
     def _new_seed_button(self, parameter: Parameter) -> Any:
         button = self._gui.add_button(self._words.label("buttons", "new seed").capitalize())

@@ -14,7 +14,7 @@ from lessons.kit.params import Parameter, values
 RADIUS = 9.0  # pixels of the standard picture
 
 
-def target(kind: str, start: Array, origin: Array, through: Array) -> Array | None:
+def where_ray_meets(kind: str, start: Array, origin: Array, through: Array) -> Array | None:
     """Where the ray from `origin` through `through` meets what the point may move on; None when it does not.
 
     kind "xy": the horizontal plane through start; "sphere": the sphere round the scene's origin through start (its
@@ -51,30 +51,38 @@ class Handles:
         self._change = change
         self._released = released
         self.dragging = False
-        self._parameters = {name: p for name, p in parameters.items() if p.kind == "point"}
+        self._parameters = {name: p for name, p in parameters.items() if p.kind in ("point", "points")}
+        self._current: Mapping[str, Any] = {}
         self._balls: dict[str, Any] = {}
         self._drawn: dict[str, tuple[Any, ...]] = {}
         self._space = Space((0.0, 0.0, 0.0), 1.0)
 
     def show(self, params: Any, style: Style, space: Space, unused: Collection[str] = ()) -> None:
         """Put the balls where the parameters say; there are none for the unused ones."""
-        current, self._space = values(params), space
-        for name, parameter in self._parameters.items():
-            if name in unused:
-                self._discard(name)
-                continue
-            x, y, z = space.display(_in_space(current[name], style))
-            at = (float(x), float(y), float(z))
-            # rounded, as a ball that is made anew for a rounding error would be lost from under the pointer
-            color, radius = style.theme.color(parameter.role), round(RADIUS * style.pixel * space.scale, 9)
-            if self._drawn.get(name) != (color, radius):
-                self._discard(name)
-                ball = self._client.scene.add_icosphere(f"/handle.{name}", radius, color, subdivisions=2,
-                                                        position=at, cast_shadow=False, receive_shadow=False)
-                self._listen(parameter, ball)
-                self._balls[name], self._drawn[name] = ball, (color, radius)
-            else:
-                self._balls[name].position = at
+        self._current, self._space = values(params), space
+        wanted = {name: p for name, p in self._parameters.items() if name not in unused}
+        shown: set[str] = set()
+        for name, parameter in wanted.items():
+            points = self._current[name] if parameter.kind == "points" else [self._current[name]]
+            for k, point in enumerate(points):
+                key = f"{name}.{k}" if parameter.kind == "points" else name
+                shown.add(key)
+                self._show(key, k, parameter, space.display(in_space(point, style)), style)
+        for key in set(self._balls) - shown:
+            self._discard(key)
+
+    def _show(self, key: str, k: int, parameter: Parameter, at: Array, style: Style) -> None:
+        x, y, z = (float(v) for v in at)
+        # rounded, as a ball that is made anew for a rounding error would be lost from under the pointer
+        color, radius = style.theme.color(parameter.role), round(RADIUS * style.pixel * self._space.scale, 9)
+        if self._drawn.get(key) == (color, radius):
+            self._balls[key].position = (x, y, z)
+            return
+        self._discard(key)
+        ball = self._client.scene.add_icosphere(f"/handle.{key}", radius, color, subdivisions=2, position=(x, y, z),
+                                                cast_shadow=False, receive_shadow=False)
+        self._listen(parameter, k, ball)
+        self._balls[key], self._drawn[key] = ball, (color, radius)
 
     def remove(self) -> None:
         for name in list(self._balls):
@@ -90,8 +98,8 @@ class Handles:
         if ball is not None:
             ball.remove()
 
-    def _listen(self, parameter: Parameter, ball: Any) -> None:
-        digits = _digits(parameter)
+    def _listen(self, parameter: Parameter, k: int, ball: Any) -> None:
+        digits = digits_of(parameter)
 
         async def dragged(event: Any) -> None:
             self.dragging = event.phase != "end"
@@ -104,22 +112,26 @@ class Handles:
             if through.shape != (3,) or not np.isfinite([eye, through]).all():
                 return
             origin, start, through = (self._space.scene(v) for v in (eye, ball.position, through))
-            found = target(parameter.plane, start, origin, through)
+            found = where_ray_meets(parameter.plane, start, origin, through)
             if found is None:
                 return
-            n = len(parameter.default)  # type: ignore[arg-type]
+            n = len(parameter.default) if parameter.kind == "point" else 2  # type: ignore[arg-type]
             point = tuple(round(float(v), digits) + 0.0 for v in found[:n])  # no minus zero
-            self._change({parameter.name: parameter.nearest(point)})
+            if parameter.kind == "point":
+                self._change({parameter.name: parameter.nearest(point)})
+            elif k < len(points := self._current[parameter.name]):
+                self._change({parameter.name: parameter.nearest([*points[:k], point, *points[k + 1:]])})
 
         ball.on_drag("left")(dragged)
 
 
-def _in_space(point: Any, style: Style) -> tuple[float, float, float]:
+def in_space(point: Any, style: Style) -> tuple[float, float, float]:
+    """The point of 2 or 3 coordinates where its handle is drawn, in scene units."""
     x, y, *z = point
     # above the flat layers of a plane view
     return (x, y, z[0] if z else (40 * style.pixel if style.layered else 0.0))
 
 
-def _digits(parameter: Parameter) -> int:
+def digits_of(parameter: Parameter) -> int:
     """Decimals that resolve about a thousandth of the range."""
     return max(0, 3 - int(np.floor(np.log10(parameter.high - parameter.low))))

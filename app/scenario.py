@@ -74,7 +74,7 @@ class Scenario:
 
 def default(entry: Entry, language: str = "en", theme: Theme = "light") -> Scenario:
     """The lesson as it opens."""
-    params = entry.lesson.Params()
+    params = entry.start
     return Scenario(entry.id, params, entry.lesson.timeline_of(params).first_shown, None, language, theme)
 
 
@@ -108,10 +108,10 @@ def with_preset(scenario: Scenario, entry: Entry, name: str) -> Scenario:
 
 def to_query(scenario: Scenario, entry: Entry) -> str:
     """The query string without '?'; only what differs from the default is written."""
-    base = default(entry)
+    bases = entry.lesson.Params(), entry.start
     pairs = [("lesson", scenario.lesson)]
     for name, value in values(scenario.params).items():
-        if value != getattr(base.params, name):
+        if any(value != getattr(base, name) for base in bases):
             pairs.append((name, entry.parameters[name].format(value)))
     timeline = entry.lesson.timeline_of(scenario.params)
     if scenario.moment != timeline.first_shown:
@@ -124,7 +124,7 @@ def to_query(scenario: Scenario, entry: Entry) -> str:
         pairs.append(("lang", scenario.language))
     if scenario.theme != "light":
         pairs.append(("theme", scenario.theme))
-    return urlencode(pairs, safe=",", quote_via=quote)
+    return urlencode(pairs, safe=",;", quote_via=quote)
 
 
 def from_query(query: str, registry: Registry, fallback: str | None = None) -> tuple[Scenario, list[str]]:

@@ -13,6 +13,7 @@ from app import scenario as scenarios
 from app.address import AddressBar
 from app.cache import ResultCache
 from app.camera import CameraController
+from app.clicks import Clicks
 from app.controls import Controls
 from app.draw.lower import lower
 from app.draw.primitives import Style, style_for
@@ -51,6 +52,7 @@ class Session:
         self._page: Page | None = None
         self._controls: Controls | None = None
         self._handles: Handles | None = None
+        self._clicks: Clicks | None = None
         self._built: str | None = None
         self._address = AddressBar(lambda query: adapter.call_page(client, "setQuery", query))
         self._settling: asyncio.TimerHandle | None = None
@@ -205,6 +207,8 @@ class Session:
         if self._handles is not None:
             lesson = self._registry[scenario.lesson].lesson
             self._handles.show(scenario.params, style, space, lesson.unused_at(scenario.params))
+        if self._clicks is not None:
+            self._clicks.show(scenario.params, view.targets, style, space, lesson.unused_at(scenario.params))
 
     def redraw_scene(self, view: View, scenario: Scenario) -> None:
         """The 3-D part as the client's own screen wants it."""
@@ -241,13 +245,16 @@ class Session:
         """Everything that belongs to one lesson."""
         page = self._page
         assert page is not None
-        for part in (self._controls, self._handles):
+        for part in (self._controls, self._handles, self._clicks):
             if part is not None:
                 part.remove()
         self._scene.clear()
         page.open_lesson(entry, words, wanted)
         with page.controls_folder:
-            self._controls = Controls(self.client.gui, entry.parameters, words, wanted.params, self.change_params)
+            self._controls = Controls(self.client.gui, entry.parameters, words, wanted.params, self.change_params,
+                                      self.notify)
+        self._clicks = Clicks(self.client, entry.parameters, self.change_params, self.notify,
+                              lambda: self.camera.canvas[1])
         self._handles = Handles(self.client, entry.parameters, self.change_params,
                                 lambda: self._worker.submit(self.scenario))
         self._built = entry.id

@@ -6,10 +6,11 @@ import importlib.util
 import logging
 import sys
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 from lessons.kit import words
 from lessons.kit.lesson import Lesson
@@ -53,6 +54,7 @@ class Entry:
     id: str
     module_name: str = ""
     path: Path | None = None
+    given: Mapping[str, str] = field(default_factory=dict, compare=False)  # kind of file -> key in kit.files
 
     @property
     def chapter(self) -> str:
@@ -78,6 +80,12 @@ class Entry:
             raise ValueError(f"{self.id}: expected a module with LESSON = Lesson(...), got {type(found).__name__}")
         return found
 
+    @cached_property
+    def start(self) -> Any:
+        """The parameters with which the lesson opens: its defaults, with the files that were given for all lessons."""
+        return replace(self.lesson.Params(), **{name: self.given[p.file.name] for name, p in self.parameters.items()
+                                                if p.file is not None and p.file.name in self.given})
+
     @property
     def parameters(self) -> Mapping[str, Parameter]:
         return parameters(self.lesson.Params)
@@ -89,17 +97,18 @@ class Entry:
 class Registry:
     """The lessons by id, in teaching order."""
 
-    def __init__(self, folder: Path | None = None) -> None:
+    def __init__(self, folder: Path | None = None, given: Mapping[str, str] | None = None) -> None:
         """folder: more lessons, `chapter/name.py` or `name.py` (chapter: the folder's name).
 
-        Raises ValueError when the folder does not exist or holds no lesson.
+        given: kind of file -> key of the file that lessons open with instead of their own data.  Raises
+        ValueError when the folder does not exist or holds no lesson.
         """
         found = [Entry(f"{chapter}.{name}", f"lessons.{chapter}.{name}")
                  for chapter, names in CHAPTERS.items() for name in names]
         found += list(_installed())
         if folder is not None:
             found += list(_in_folder(folder))
-        self._entries = {entry.id: entry for entry in found}
+        self._entries = {entry.id: replace(entry, given=given or {}) for entry in found}
 
     def __iter__(self) -> Iterator[Entry]:
         return iter(self._entries.values())

@@ -29,6 +29,7 @@ from websockets.datastructures import Headers
 from websockets.http11 import Request, Response
 
 from app.scenario import VIEWER_NAMES
+from lessons.kit import files
 
 log = logging.getLogger(__name__)
 
@@ -40,6 +41,7 @@ _UNWANTED = (
     messages.ShareUrlRequest, messages.ShareUrlDisconnect, messages.GuiFormSubmitMessage,
     messages.GuiFormDirtyMessage, messages.FileTransferStartUpload, messages.FileTransferPart,
 )
+MAX_PARTS = 256
 
 
 def start_server(host: str, port: int, hosts: frozenset[str] = LOOPBACK) -> viser.ViserServer:
@@ -66,6 +68,9 @@ def prepare_client(client: viser.ClientHandle) -> None:
         connection.unregister_handler(kind)
         if ours is not None:
             connection.register_handler(kind, ours)
+    for kind, ours in ((messages.FileTransferStartUpload, _checked_start(client)),
+                       (messages.FileTransferPart, _checked_part(client))):
+        connection.register_handler(kind, ours)
     client.gui._setup_plotly_js = True  # broadcast once at the start, for all clients
     run_script(client, _page_js())
 
@@ -182,6 +187,47 @@ def _checked_update(client: viser.ClientHandle) -> Callable[..., Any]:
             log.warning("client %s: ignored the value %.80r of a widget", client_id, value)
             return
         await inner(client_id, message)
+
+    return handle
+
+
+def _checked_start(client: viser.ClientHandle) -> Callable[..., Any]:
+    """An upload begins only at an upload button of this client, one at a time, and no larger than a file may be."""
+    gui = client.gui
+
+    async def handle(client_id: int, message: messages.FileTransferStartUpload) -> None:
+        button = gui._gui_input_handle_from_uuid.get(message.source_component_uuid)
+        well_formed = (isinstance(message.filename, str) and len(message.filename) <= 1000
+                       and isinstance(message.transfer_uuid, str) and len(message.transfer_uuid) <= 100
+                       and all(isinstance(n, int) for n in (message.part_count, message.size_bytes))
+                       and 0 <= message.part_count <= MAX_PARTS)
+        if not isinstance(button, viser.GuiUploadButtonHandle) or not well_formed:
+            log.warning("client %s: refused an upload", client_id)
+        elif not 0 <= message.size_bytes <= files.MAX_FILE_BYTES:
+            client.add_notification("This file cannot be used", f"It is larger than {files.MAX_FILE_BYTES // 2**20} "
+                                    "MiB.", auto_close_seconds=12.0)
+        else:
+            gui._drop_uploads_from_client(client_id)
+            gui._handle_file_transfer_start(client_id, message)
+
+    return handle
+
+
+def _checked_part(client: viser.ClientHandle) -> Callable[..., Any]:
+    """Parts are taken while they fit into the size that was announced; else the upload is dropped."""
+    gui = client.gui
+
+    async def handle(client_id: int, message: messages.FileTransferPart) -> None:
+        state = gui._current_file_upload_states.get(message.transfer_uuid)
+        if state is None:
+            return
+        fits = (isinstance(message.content, bytes) and isinstance(message.part_index, int)
+                and state["transferred_bytes"] + len(message.content) <= state["total_bytes"])
+        if not fits:
+            log.warning("client %s: an upload does not keep to its size", client_id)
+            gui._drop_uploads_from_client(client_id)
+            return
+        gui._handle_file_transfer_part(client_id, message)
 
     return handle
 

@@ -39,6 +39,12 @@ def put(name: str, content: bytes) -> str:
     return key
 
 
+def has(key: str) -> bool:
+    """Whether the file of this key is here."""
+    with _lock:
+        return key in _files
+
+
 def get(key: str) -> GivenFile:
     """The file of this key.  LookupError when it is not here (any more)."""
     with _lock:

@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
+from lessons.kit import files
+
 Kind = Literal["float", "int", "choice", "switch", "point", "points", "names", "file", "seed"]
 Point = tuple[float, ...]
 Points = tuple[Point, ...]
@@ -14,7 +16,6 @@ Value = float | int | str | bool | Point | Points | Names
 
 SEED_LIMIT = 2**31 - 1
 NAME = re.compile(r"[A-Za-z0-9_.\-]{1,32}")
-DIGEST = re.compile(r"[0-9a-f]{16}")
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,7 +79,7 @@ class Parameter:
                     raise self._error(self.expected, value)
                 return tuple(value)
             case "file":
-                if isinstance(value, str) and (value == "" or DIGEST.fullmatch(value)):
+                if value == "" or (isinstance(value, str) and self._is_ours(value)):
                     return value
                 raise self._error(self.expected, value)
             case "int" | "seed":
@@ -166,11 +167,15 @@ class Parameter:
                 return (f"at most {self.limit} names with commas between them, each of at most 32 letters, digits and "
                         "the signs _ . -")
             case "file":
-                return "the 16 hexadecimal digits of a file that this server has been given"
+                return f"{self.file.name} that this server has been given"  # type: ignore[union-attr]
             case "int" | "seed":
                 return f"a whole number from {int(self.low)} to {int(self.high)}"
             case _:
                 return f"a number from {self.low:g} to {self.high:g}"
+
+    def _is_ours(self, key: str) -> bool:
+        """Whether a file of this kind lies in the store under `key`."""
+        return self.file is not None and files.has(key) and self.file.recognise(files.get(key).content)
 
     def _parse_number(self, text: str) -> float:
         try:

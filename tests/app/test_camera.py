@@ -10,7 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from app.camera import CameraController, Pose, fit
-from app.handles import target
+from app.handles import where_ray_meets as target
 from app.scenario import CameraPose
 from lessons.kit.scene import Camera, Orbit, Plane
 

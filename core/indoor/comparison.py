@@ -1,0 +1,117 @@
+"""The graph filters against the Kalman filters without a map, on the same walk and the same scans.  GBPF ch. 6 (ours)."""
+
+import time
+from collections.abc import Callable, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from core.indoor.graph import FloorGraph
+from core.indoor.kalman_filters import Grid, cpkf, cvkf, position_fixes
+from core.indoor.routes import Truth, random_stops, walk_route
+from core.indoor.signal import AccessPoints
+from core.indoor.simulate import simulate_scans
+from core.indoor.tracking import run
+from core.indoor.walk import Walk
+from core.types import Array, Gaussian
+
+FILTERS = ("tll", "equal", "cvkf", "cpkf")
+PAUSES_S = (5.0, 20.0)
+
+
+class Outcome(NamedTuple):
+    """What one filter made of a walk: xy_m (T, 2), horizontal errors_m (T,), right_floor (T,), time for one step."""
+
+    xy_m: Array
+    errors_m: Array
+    right_floor: Array
+    seconds_per_step: float
+
+
+class FixLaw(NamedTuple):
+    """How good position fixes are on a map: R (2, 2) their mean square error in m^2, floor_rate their right floors."""
+
+    R: Array
+    floor_rate: float
+
+
+def random_walk_through(graph: FloorGraph, stops: int, rng: "np.random.Generator", speed_mps: float = 1.2) -> Truth:
+    """A walk at constant speed between `stops` random rooms by the quickest ways, with rests of 5 to 20 s (PAUSES_S)."""
+    nodes = random_stops(graph, stops, rng)
+    return walk_route(graph, nodes, speed_mps=speed_mps, pause_s=rng.uniform(*PAUSES_S, size=stops - 1))
+
+
+def candidates(graph: FloorGraph, cell_m: float = 1.0) -> Grid:
+    """The places of the graph's bounding box as candidates for position fixes."""
+    corners = np.concatenate([np.array([n[:2] for n in graph.nodes.values()]).reshape(-1, 2),
+                              *(a.polygon for a in graph.areas.values())])
+    return Grid(tuple(corners.min(axis=0).tolist()), tuple(corners.max(axis=0).tolist()), cell_m)
+
+
+def fix_law(graph: FloorGraph, points: AccessPoints, grid: Grid, seed: int = 0, size: int = 400) -> FixLaw:
+    """R = mean of e e' over the fixes of `size` scans at random places of the map: what the Kalman filters are told."""
+    from core.indoor.cloud import scatter
+
+    rng = np.random.default_rng([seed, size])
+    cloud = scatter(graph, size, rng)
+    y = points.expected(cloud.position_m, cloud.floor) + points.sigma_db * rng.standard_normal((size, len(points)))
+    y[y < points.threshold_dbm] = np.nan
+    heard = ~np.isnan(y).all(axis=1)
+    fixes = position_fixes(y[heard], points, grid)
+    e = fixes.xy_m - cloud.position_m[heard, :2]
+    return FixLaw(e.T @ e / len(e), float((fixes.floor == cloud.floor[heard]).mean()))
+
+
+def compare(
+    graph: FloorGraph,
+    points: AccessPoints,
+    truth: Truth,
+    rng: "np.random.Generator",
+    *,
+    interval_s: float = 1.0,
+    n_particles: int = 500,
+    filters: Sequence[str] = FILTERS,
+    walk: Walk | None = None,
+    grid: Grid | None = None,
+    R: Array | None = None,
+    q_cp: float = 8.0,
+    q_cv: float = 0.05,
+    progress: Callable[[float], object] | None = None,
+) -> dict[str, Outcome]:
+    """{filter: Outcome} on one draw of the scans, for the filters "tll", "equal", "cvkf", "cpkf".
+
+    interval_s between scans; walk: motion of the graph filters, whose rule is replaced; grid, R: `candidates` and
+    `fix_law` unless given; q_cp in m^2/s, q_cv in m^2/s^3.  Each graph filter draws from a stream of its own, so that
+    leaving one out does not change another.  ValueError for unknown filters, and as in `run`, `cpkf` and `cvkf`.
+    """
+    if unknown := set(filters) - set(FILTERS):
+        raise ValueError(f"filters: expected some of {', '.join(FILTERS)}, got {', '.join(sorted(unknown))}")
+    from dataclasses import replace
+
+    scan_rng, *streams = rng.spawn(1 + len(FILTERS))
+    scans = simulate_scans(truth, points, scan_rng, interval_s=interval_s)
+    dt_s = float(truth.time_s[1] - truth.time_s[0]) if len(truth.time_s) > 1 else 1.0
+    grid = grid or candidates(graph)
+    found = {}
+    for k, name in enumerate(filters):
+        begun = time.perf_counter()
+        if name in ("tll", "equal"):
+            r = run(graph, scans, points, streams[FILTERS.index(name)], n_particles=n_particles, dt_s=dt_s,
+                    walk=replace(walk or Walk(), rule=name), subsample=1)
+            xy, floor = r.projected, r.floor
+        else:
+            R = fix_law(graph, points, grid).R if R is None else R
+            track = _kalman(name, scans, points, grid, R, dt_s, q_cp if name == "cpkf" else q_cv)
+            xy, floor = track.xy_m, track.floor
+        seconds = (time.perf_counter() - begun) / len(scans)
+        errors = np.sqrt(np.square(xy - truth.position_m[:, :2]).sum(axis=1))
+        found[name] = Outcome(xy, errors, floor == truth.floor, seconds)
+        if progress:
+            progress((k + 1) / len(filters))
+    return found
+
+
+def _kalman(name: str, scans: Array, points: AccessPoints, grid: Grid, R: Array, dt_s: float, q: float):  # noqa: ANN202
+    low, high = np.array(grid.low_m), np.array(grid.high_m)
+    start = Gaussian(0.5 * (low + high), np.diag(np.square(0.5 * (high - low))))
+    return (cpkf if name == "cpkf" else cvkf)(scans, points, grid, start, dt_s=dt_s, q=q, R=R)
