@@ -71,11 +71,24 @@ def _parser() -> argparse.ArgumentParser:
     export.add_argument("--figure", metavar="NAME", help="the plot to write instead of the scene")
     export.add_argument("--no-legend", action="store_true", help="without caption and legend")
 
+    _study_options(command("study", commands.study, "Compare filters over many walks and write the table."))
+
     check = command("check", commands.check, "Run every lesson at default, presets and limits; print what is wrong.")
     check.add_argument("--json", action="store_true", help="as JSON")
     check.add_argument("--map", "--data", action="append", default=[], type=Path, metavar="FILE", dest="files",
                        help="check this file instead of the lessons; may be repeated")
     return parser
+
+
+def _study_options(study: argparse.ArgumentParser) -> None:
+    study.add_argument("subject", choices=["indoor"], help="what is compared: the filters of the indoor laboratory")
+    study.add_argument("--routes", type=_count, default=10, metavar="R", help="random walks through the building")
+    study.add_argument("--seeds", type=_count, default=20, metavar="S", help="draws of the noise for each walk")
+    study.add_argument("--particles", type=_count, default=1000, metavar="N", help="of the graph filters")
+    study.add_argument("--to", type=Path, default=Path("study"), metavar="DIR",
+                       help="folder for runs.csv, table.csv and table.md; a study in it is gone on with")
+    study.add_argument("--map", action="append", default=[], type=Path, metavar="FILE", dest="files",
+                       help="another building than our own")
 
 
 def _file_option(parser: argparse.ArgumentParser) -> None:
@@ -96,6 +109,12 @@ def _scenario_options(parser: argparse.ArgumentParser) -> None:
 def _port(text: str) -> int:
     if not text.isdigit() or not 1 <= int(text) <= 65535:
         raise argparse.ArgumentTypeError(f"expected a whole number from 1 to 65535, got {text!r}")
+    return int(text)
+
+
+def _count(text: str) -> int:
+    if not text.isdigit() or not 1 <= int(text) <= 1_000_000:
+        raise argparse.ArgumentTypeError(f"expected a whole number from 1 to 1,000,000, got {text!r}")
     return int(text)
 
 

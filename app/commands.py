@@ -139,6 +139,40 @@ def check(options: argparse.Namespace) -> int:
     return 1 if wrong else 0
 
 
+def study(options: argparse.Namespace) -> int:
+    from tqdm import tqdm
+
+    from app import study as studies
+    from lessons.indoor._building import building
+
+    if len(options.files) > 1:
+        raise UsageError("--map: expected one map, as a study compares filters on one building")
+    house = building(_registry(options)["indoor.floor_graph"].start.map if options.files else "")
+    settings = studies.Settings(options.routes, options.seeds, particles=options.particles,
+                                map=studies.fingerprint(house))
+    try:
+        bars: list[tqdm] = []    # none before the folder has been looked at
+
+        def progress(done: int, total: int) -> None:
+            if not bars:
+                bars.append(tqdm(total=total, initial=done, unit="run", dynamic_ncols=True))
+            bars[0].update(done - bars[0].n)
+
+        try:
+            lines = studies.run(house, settings, options.to, progress)
+        finally:
+            for bar in bars:
+                bar.close()
+    except KeyboardInterrupt:
+        print(f"Interrupted; the same command goes on from {options.to / studies.RUNS}.", file=sys.stderr)
+        return 130
+    except ValueError as error:
+        raise UsageError(f"study: {error}") from None
+    print(studies.as_markdown(lines))
+    print(f"Written: {options.to / studies.TABLE_CSV}, {options.to / studies.TABLE_MD}")
+    return 0
+
+
 def _check_files(options: argparse.Namespace) -> int:
     """Say of each file whether lessons can use it."""
     from app import given
