@@ -115,6 +115,11 @@ def ends(parameter: Parameter) -> list[Any]:
         case "point":
             n = len(parameter.default)  # type: ignore[arg-type]
             found = [(parameter.low,) * n, (parameter.high,) * n]
+        case "points":
+            line = [(1.0 - t) * parameter.low + t * parameter.high for t in np.linspace(0.0, 1.0, parameter.limit)]
+            found = [(), tuple((v, v) for v in line)]
+        case "names" | "file":
+            found = [parameter.default, "" if parameter.kind == "file" else ()]
         case "int" | "seed":
             found = [int(parameter.low), int(parameter.high)]
         case _:

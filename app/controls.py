@@ -18,7 +18,8 @@ class Controls:
     """The widgets of one lesson in the current container of `gui`."""
 
     def __init__(self, gui: Any, parameters: Mapping[str, Parameter], words: Words, params: Any,
-                 change: Change, notify: Callable[[str, str], None]) -> None:
+                 change: Change, notify: Callable[[str, str], None], unused: Collection[str] = ()) -> None:
+        """Of the groups the first two that are seen stand open, and those that are not seen at first."""
         self._gui = gui
         self._notify = notify
         self._words = words
@@ -32,9 +33,12 @@ class Controls:
         groups: dict[str, list[Parameter]] = {}
         for parameter in parameters.values():
             groups.setdefault(parameter.group, []).append(parameter)
-        for at, (group, members) in enumerate(groups.items()):
+        seen = 0
+        for group, members in groups.items():
+            hidden = all(p.name in unused for p in members)
+            seen += not hidden
             if group:
-                folder = gui.add_folder(words.label("groups", group), expand_by_default=at < 2)
+                folder = gui.add_folder(words.label("groups", group), expand_by_default=hidden or seen <= 2)
                 self._roots.append(folder)
                 self._folders.append((folder, {p.name for p in members}))
                 with folder:

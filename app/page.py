@@ -68,7 +68,8 @@ class Page:
             self._picture_controls()
         with tabs.add_tab("Help", viser.Icon.KEYBOARD):
             rows = "".join(f"<tr><td>{html.escape(k)}</td><td>{html.escape(v)}</td></tr>" for k, v in KEYS)
-            gui.add_html(f'<div class="pk"><h1>Keys and mouse</h1><table class="pk-keys">{rows}</table></div>')
+            gui.add_html(f'<div class="pk"><h1>Keys and mouse</h1><table class="pk-keys">{rows}</table>'
+                         "<p>Without a graphics processor the browser draws slowly: show fewer particles.</p></div>")
         panel = gui.add_panel(order=1)
         with panel.add_tab("Timeline and numbers", viser.Icon.CLOCK):
             self._transport_folder = gui.add_folder(None)

@@ -252,7 +252,7 @@ class Session:
         page.open_lesson(entry, words, wanted)
         with page.controls_folder:
             self._controls = Controls(self.client.gui, entry.parameters, words, wanted.params, self.change_params,
-                                      self.notify)
+                                      self.notify, entry.lesson.unused_at(wanted.params))
         self._clicks = Clicks(self.client, entry.parameters, self.change_params, self.notify,
                               lambda: self.camera.canvas[1])
         self._handles = Handles(self.client, entry.parameters, self.change_params,

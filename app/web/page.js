@@ -101,9 +101,17 @@
     lastNow = name;
   };
 
+  // viser's advice about slow drawing lies over the caption; our Help says it instead.
+  const hideAdvice = () => {
+    for (const note of document.querySelectorAll("[role=alert]")) {
+      if (note.textContent.startsWith("Software WebGL")) note.style.display = "none";
+    }
+  };
+
   let naming = 0;
   new MutationObserver(() => {
     followNow();
+    hideAdvice();
     clearTimeout(naming);
     naming = setTimeout(nameInputs, 120);
   }).observe(document.body, { childList: true, subtree: true });

@@ -6,6 +6,7 @@ Role = Literal[
     "truth", "measurement", "prior", "likelihood", "posterior", "innovation", "linearised", "monte_carlo", "sigma",
     "kf", "ekf", "ukf", "pf", "grid", "mixture", "station", "satellite", "handle", "axis_x", "axis_y", "axis_z",
     "frame_a1", "frame_a2", "rotation", "vector", "reference", "muted", "warning",
+    "link", "area", "accessor",
 ]
 
 ROLES: tuple[str, ...] = get_args(Role)
@@ -18,6 +19,7 @@ ROLE_NAMES: dict[str, dict[str, str]] = {
         "pf": "particle filter", "grid": "grid filter", "mixture": "Gaussian mixture", "station": "station",
         "satellite": "satellite", "handle": "drag me", "axis_x": "x axis", "axis_y": "y axis", "axis_z": "z axis",
         "frame_a1": "frame A1", "frame_a2": "frame A2", "rotation": "rotation vector", "vector": "vector",
-        "reference": "reference", "muted": "other", "warning": "warning",
+        "reference": "reference", "muted": "other", "warning": "warning", "link": "link", "area": "open area",
+        "accessor": "accessor node",
     },
 }
