@@ -143,8 +143,10 @@ class Controls:
 
     def _list_buttons(self, parameter: Parameter, widget: Any) -> Any:
         """A list grows by clicks into the scene; here it gets shorter."""
-        last, all_ = (self._words.label("buttons", name).capitalize() for name in ("remove last", "remove all"))
-        buttons = self._gui.add_button_group("", (last, all_))
+        shown = ("remove last", "remove all") if parameter.limit > 1 else ("clear",)
+        options = tuple(self._words.label("buttons", name).capitalize() for name in shown)
+        last = options[0] if len(options) > 1 else ""
+        buttons = self._gui.add_button_group("", options)
 
         async def shorten(event: Any) -> None:
             if event.client is not None:

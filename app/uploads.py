@@ -17,13 +17,14 @@ class FileControl:
                  change: Callable[[Mapping[str, object]], None], notify: Callable[[str, str], None]) -> None:
         assert parameter.file is not None
         self._parameter, self._change, self._notify = parameter, change, notify
-        self._name = gui.add_text(label, "", disabled=True, hint=hint)
-        self._load = gui.add_upload_button(f"Load {parameter.file.name} \u2026",
-                                           mime_type=",".join(parameter.file.suffixes), hint=hint)
-        self._back = gui.add_button("Back to the lesson's own data", color="gray")
-        self._load.on_upload(self._loaded)
+        self._root = gui.add_folder(None)     # viser's upload button cannot be hidden by itself
+        with self._root:
+            self._name = gui.add_text(label, "", disabled=True, hint=hint)
+            load = gui.add_upload_button(f"Load {parameter.file.name} \u2026",
+                                         mime_type=",".join(parameter.file.suffixes), hint=hint)
+            self._back = gui.add_button("Back to the lesson's own data", color="gray")
+        load.on_upload(self._loaded)
         self._back.on_click(self._go_back)
-        self._value, self._visible = value, True
         self.value = value
 
     @property
@@ -34,21 +35,18 @@ class FileControl:
     def value(self, key: str) -> None:
         self._value = key
         self._name.value = files.get(key).name if key else "the lesson's own"
-        self._back.visible = self._visible and bool(key)
+        self._back.visible = bool(key)
 
     @property
     def visible(self) -> bool:
-        return self._visible
+        return self._root.visible
 
     @visible.setter
     def visible(self, shown: bool) -> None:
-        self._visible = shown
-        self._name.visible = self._load.visible = shown
-        self._back.visible = shown and bool(self._value)
+        self._root.visible = shown
 
     def remove(self) -> None:
-        for part in (self._name, self._load, self._back):
-            part.remove()
+        self._root.remove()
 
     def _loaded(self, event: Any) -> None:
         """Runs in a thread of viser's pool: a check may take a second."""

@@ -16,7 +16,7 @@ from core.indoor.filter import Belief, Recovery, Step, start, step
 from core.indoor.graph import Area, FloorGraph, Link, Node
 from core.indoor.kalman_filters import Grid, Track, cpkf, cvkf, position_fixes
 from core.indoor.learning import coverage_area, fit_path_loss, locate_access_point
-from core.indoor.link_length import total_link_length, total_link_lengths
+from core.indoor.link_length import objects_behind, total_link_length, total_link_lengths
 from core.indoor.motion import Choices, advance
 from core.indoor.point_estimates import Estimates, Projection, estimates, floor_rate, object_weights, project
 from core.indoor.routes import Truth, random_stops, shortest_route, walk_route
@@ -30,7 +30,8 @@ __all__ = [
     "Projection", "RadioMap", "Recovery", "Run", "Step", "Track", "Truth", "Walk", "advance", "categorical",
     "choice_probabilities", "constrained_transition", "coverage_area", "cpkf", "cvkf", "directions", "disc_probability",
     "estimates", "fit_path_loss", "floor_rate", "hall_map", "inscribed_disc", "is_open_area", "link_chain",
-    "locate_access_point", "mixed_measure", "object_weights", "office_building", "place", "position_fixes", "project",
+    "locate_access_point", "mixed_measure", "object_weights", "objects_behind",
+    "office_building", "place", "position_fixes", "project",
     "radio_map", "random_stops", "room_corridor", "run", "sample_measure", "scatter", "shortest_route",
     "simulate_scans", "start", "step", "straighten", "time_shares", "total_link_length", "total_link_lengths",
     "trained", "tree_map", "walk_route",

@@ -19,6 +19,18 @@ def total_link_length(graph: FloorGraph, object_id: Id, node_id: Id) -> float:
     >>> total_link_length(g, "a", "n1"), total_link_length(g, "b", "n2")
     (35.0, 20.0)
     """
+    return sum(graph.length(q) for q in objects_behind(graph, object_id, node_id))
+
+
+def objects_behind(graph: FloorGraph, object_id: Id, node_id: Id) -> tuple[Id, ...]:
+    """The objects whose lengths TLL(o | n) adds up, o among them, in the map's order.  Errors as there.
+
+    >>> g = FloorGraph.from_dict({
+    ...     "nodes": {"n1": [0, 0], "n2": [10, 0], "n3": [30, 0], "n4": [10, 5]},
+    ...     "links": {"a": ["n1", "n2"], "b": ["n2", "n3"], "d": ["n2", "n4"]}})
+    >>> objects_behind(g, "a", "n1"), objects_behind(g, "b", "n2")
+    (('a', 'b', 'd'), ('b',))
+    """
     if object_id not in graph.objects_at(node_id):
         graph.length(object_id)                           # an unknown id is reported as such
         raise ValueError(f"object_id: expected an object at node {node_id!r}, one of {graph.objects_at(node_id)}, "
@@ -31,7 +43,7 @@ def total_link_length(graph: FloorGraph, object_id: Id, node_id: Id) -> float:
                 fresh = [q for q in graph.objects_at(m) if q not in reached]
                 reached |= dict.fromkeys(fresh)
                 stack += fresh
-    return sum(graph.length(q) for q in graph.object_ids if q in reached)
+    return tuple(q for q in graph.object_ids if q in reached)
 
 
 def total_link_lengths(graph: FloorGraph) -> Mapping[tuple[Id, Id], float]:

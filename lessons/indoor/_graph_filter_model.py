@@ -1,0 +1,134 @@
+"""A walk through the building and four filters on the same scans, thinned to what can be drawn."""
+
+from collections.abc import Mapping, Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from core.indoor import (
+    AccessPoints,
+    FloorGraph,
+    Truth,
+    Walk,
+    cpkf,
+    cvkf,
+    estimates,
+    random_stops,
+    run,
+    simulate_scans,
+    walk_route,
+)
+from core.indoor.cloud import gather
+from core.indoor.comparison import candidates, fix_law
+from core.indoor.filter import Step
+from core.types import Array, Gaussian
+from lessons.kit.lesson import Progress
+
+DRAWN, JUDGED = 800, 300        # particles that are drawn, and that the slower point estimates look at
+ESTIMATES = ("projected", "mean", "nearest", "medoid", "mode")
+MOST_EPOCHS = 900
+
+
+class GraphTrack(NamedTuple):
+    """One graph filter over T epochs.
+
+    predicted, after (T, M, 3) drawn particles before and after the resampling; weights (T, M) of the predicted ones, of
+    sum 1; n_eff, log_evidence, floor (T,); resampled (T,); points: estimate -> (T, 2); spread (T,) in metres (1 sigma).
+    """
+
+    predicted: Array
+    weights: Array
+    after: Array
+    n_eff: Array
+    log_evidence: Array
+    resampled: Array
+    floor: Array
+    points: Mapping[str, Array]
+    spread: Array
+
+
+class KalmanTrack(NamedTuple):
+    """xy_m (T, 2), floor (T,), and the position part of the covariance (T, 2, 2)."""
+
+    xy_m: Array
+    floor: Array
+    cov: Array
+
+
+def route_of(graph: FloorGraph, routes: Mapping[str, Sequence[str]], walk: str, own: Sequence[str],
+             seed: int) -> tuple[list[str], str]:
+    """The nodes to walk through, and a note where they are not those asked for."""
+    if walk == "own":
+        known = [n for n in own if n in graph.nodes]
+        if len(known) >= 2:
+            return known, "" if len(known) == len(own) else "Nodes that this map does not have were left out."
+        first = next(iter(graph.nodes))
+        start = known[0] if known else first
+        goal = next(n for n in graph.nodes if n != start)
+        return [start, goal], "Click nodes to draw a route: at least two."
+    if walk in routes:
+        return list(routes[walk]), ""
+    nodes = random_stops(graph, 4, np.random.default_rng(seed))
+    return nodes, f"This map has no route {walk!r}; the walk goes through random rooms."
+
+
+def walked(graph: FloorGraph, nodes: Sequence[str], speed_mps: float, pause_s: float) -> Truth:
+    """The truth; a walk of more than MOST_EPOCHS seconds is cut."""
+    truth = walk_route(graph, nodes, speed_mps=speed_mps, pause_s=pause_s)
+    if len(truth.time_s) > MOST_EPOCHS:
+        truth = walk_route(graph, nodes, speed_mps=speed_mps, pause_s=pause_s, epochs=MOST_EPOCHS)
+    return truth
+
+
+def scanned(truth: Truth, points: AccessPoints, interval_s: float, seed: int) -> Array:
+    """Scans (T, m) along the walk; the same seed gives the same noise."""
+    return simulate_scans(truth, points, np.random.default_rng([seed, 1]), interval_s=interval_s)
+
+
+def graph_filter(graph: FloorGraph, scans: Array, points: AccessPoints, walk: Walk, n: int, threshold: float,
+                 seed: int, progress: Progress) -> GraphTrack:
+    """The graph-based particle filter with everything that is drawn of it."""
+    index = ((2 * np.arange(min(n, DRAWN)) + 1) * n) // (2 * min(n, DRAWN))
+    judged = ((2 * np.arange(min(n, JUDGED)) + 1) * n) // (2 * min(n, JUDGED))
+
+    def keep(k: int, s: Step) -> tuple[Array, ...]:
+        w = s.weights_before[index]
+        total = float(w.sum())
+        weights = w / total if total > 0.0 else np.full(len(w), 1.0 / len(w))
+        return (s.predicted.position_m[index].astype(np.float32), weights.astype(np.float32),
+                s.particles.position_m[index].astype(np.float32), _points(graph, s, judged))
+
+    r = run(graph, scans, points, np.random.default_rng([seed, 2]), n_particles=n, walk=walk, threshold=threshold,
+            subsample=1, keep=keep, progress=progress)
+    predicted, weights, after, judgements = (np.array(column) for column in zip(*r.kept, strict=True))
+    named = {name: judgements[:, k] for k, name in enumerate(ESTIMATES)}
+    return GraphTrack(predicted, weights, after, r.n_eff, r.log_evidence, r.resampled, r.floor, named,
+                      np.sqrt(np.trace(r.cov, axis1=1, axis2=2)))
+
+
+def _points(graph: FloorGraph, s: Step, judged: Array) -> Array:
+    """(5, 2): the point estimates; the slow ones from some of the particles."""
+    cloud, w = gather(s.predicted, judged), s.weights_before[judged]
+    if not w.sum() > 0.0:
+        w = np.full(len(judged), 1.0 / len(judged))
+    e = estimates(graph, cloud, w)
+    xy = cloud.position_m[:, :2]
+    return np.array([s.projection.xy_m, s.mean, xy[e.nearest], xy[e.medoid], xy[e.mode]])
+
+
+def kalman_tracks(graph: FloorGraph, scans: Array, points: AccessPoints, q_cv: float,
+                  q_cp: float) -> dict[str, KalmanTrack]:
+    """CVKF and CPKF on position fixes of the same scans; they do not know the map."""
+    grid = candidates(graph)
+    R = fix_law(graph, points, grid).R
+    low, high = np.array(grid.low_m), np.array(grid.high_m)
+    start = Gaussian(0.5 * (low + high), np.diag(np.square(0.5 * (high - low))))
+    if np.isnan(scans).all():
+        still = KalmanTrack(np.tile(start.mean, (len(scans), 1)), np.full(len(scans), graph.floors[0]),
+                            np.tile(start.cov, (len(scans), 1, 1)))
+        return {"cvkf": still, "cpkf": still}
+    found = {}
+    for name, track in (("cvkf", cvkf(scans, points, grid, start, q=q_cv, R=R)),
+                        ("cpkf", cpkf(scans, points, grid, start, q=q_cp, R=R))):
+        found[name] = KalmanTrack(track.xy_m, track.floor, track.record.posterior.cov[:, :2, :2])
+    return found
