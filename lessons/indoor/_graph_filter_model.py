@@ -12,15 +12,14 @@ from core.indoor import (
     Walk,
     cpkf,
     cvkf,
-    estimates,
     random_stops,
     run,
     simulate_scans,
     walk_route,
 )
-from core.indoor.cloud import gather
 from core.indoor.comparison import candidates, fix_law
 from core.indoor.filter import Step
+from core.indoor.point_estimates import density_mode, medoid, nearest_particle
 from core.types import Array, Gaussian
 from lessons.kit.lesson import Progress
 
@@ -33,17 +32,16 @@ class GraphTrack(NamedTuple):
     """One graph filter over T epochs.
 
     predicted, after (T, M, 3) drawn particles before and after the resampling; weights (T, M) of the predicted ones, of
-    sum 1; n_eff, log_evidence, floor (T,); resampled (T,); points: estimate -> (T, 2); spread (T,) in metres (1 sigma).
+    sum 1; n_eff, floor, resampled (T,); xy_m (T, 2) the point estimate; spread (T,) of the cloud in metres (1 sigma).
     """
 
     predicted: Array
     weights: Array
     after: Array
     n_eff: Array
-    log_evidence: Array
     resampled: Array
     floor: Array
-    points: Mapping[str, Array]
+    xy_m: Array
     spread: Array
 
 
@@ -86,34 +84,34 @@ def scanned(truth: Truth, points: AccessPoints, interval_s: float, seed: int) ->
 
 
 def graph_filter(graph: FloorGraph, scans: Array, points: AccessPoints, walk: Walk, n: int, threshold: float,
-                 seed: int, progress: Progress) -> GraphTrack:
+                 estimate: str, seed: int, progress: Progress) -> GraphTrack:
     """The graph-based particle filter with everything that is drawn of it."""
-    index = ((2 * np.arange(min(n, DRAWN)) + 1) * n) // (2 * min(n, DRAWN))
-    judged = ((2 * np.arange(min(n, JUDGED)) + 1) * n) // (2 * min(n, JUDGED))
+    index, judged = (((2 * np.arange(min(n, m)) + 1) * n) // (2 * min(n, m)) for m in (DRAWN, JUDGED))
 
     def keep(k: int, s: Step) -> tuple[Array, ...]:
         w = s.weights_before[index]
         total = float(w.sum())
         weights = w / total if total > 0.0 else np.full(len(w), 1.0 / len(w))
         return (s.predicted.position_m[index].astype(np.float32), weights.astype(np.float32),
-                s.particles.position_m[index].astype(np.float32), _points(graph, s, judged))
+                s.particles.position_m[index].astype(np.float32), _point(s, estimate, judged))
 
     r = run(graph, scans, points, np.random.default_rng([seed, 2]), n_particles=n, walk=walk, threshold=threshold,
             subsample=1, keep=keep, progress=progress)
-    predicted, weights, after, judgements = (np.array(column) for column in zip(*r.kept, strict=True))
-    named = {name: judgements[:, k] for k, name in enumerate(ESTIMATES)}
-    return GraphTrack(predicted, weights, after, r.n_eff, r.log_evidence, r.resampled, r.floor, named,
+    predicted, weights, after, xy = (np.array(column) for column in zip(*r.kept, strict=True))
+    return GraphTrack(predicted, weights, after, r.n_eff, r.resampled, r.floor, xy,
                       np.sqrt(np.trace(r.cov, axis1=1, axis2=2)))
 
 
-def _points(graph: FloorGraph, s: Step, judged: Array) -> Array:
-    """(5, 2): the point estimates; the slow ones from some of the particles."""
-    cloud, w = gather(s.predicted, judged), s.weights_before[judged]
-    if not w.sum() > 0.0:
-        w = np.full(len(judged), 1.0 / len(judged))
-    e = estimates(graph, cloud, w)
-    xy = cloud.position_m[:, :2]
-    return np.array([s.projection.xy_m, s.mean, xy[e.nearest], xy[e.medoid], xy[e.mode]])
+def _point(s: Step, estimate: str, judged: Array) -> Array:
+    """The point estimate of a step; the slow ones look at some of the particles on the likeliest floor."""
+    if estimate in ("projected", "mean"):
+        return s.projection.xy_m if estimate == "projected" else s.mean
+    here = judged[(s.predicted.floor[judged] == s.floor) & (s.weights_before[judged] > 0.0)]
+    if not here.size:
+        return s.mean
+    xy, w = s.predicted.position_m[here, :2], s.weights_before[here]
+    choose = {"nearest": nearest_particle, "medoid": medoid, "mode": density_mode}[estimate]
+    return xy[choose(xy, w)]
 
 
 def kalman_tracks(graph: FloorGraph, scans: Array, points: AccessPoints, q_cv: float,
