@@ -19,6 +19,7 @@ from core.indoor.learning import coverage_area, fit_path_loss, locate_access_poi
 from core.indoor.link_length import objects_behind, total_link_length, total_link_lengths
 from core.indoor.motion import Choices, advance
 from core.indoor.point_estimates import Estimates, Projection, estimates, floor_rate, object_weights, project
+from core.indoor.replicas import Replicas, replicate
 from core.indoor.routes import Truth, random_stops, shortest_route, walk_route
 from core.indoor.signal import AccessPoints, RadioMap, radio_map
 from core.indoor.simulate import simulate_scans
@@ -27,12 +28,12 @@ from core.indoor.walk import Walk
 
 __all__ = [
     "AccessPoints", "Area", "Belief", "Choices", "Cloud", "Estimates", "FloorGraph", "Grid", "Link", "Node",
-    "Projection", "RadioMap", "Recovery", "Run", "Step", "Track", "Truth", "Walk", "advance", "categorical",
+    "Projection", "RadioMap", "Recovery", "Replicas", "Run", "Step", "Track", "Truth", "Walk", "advance", "categorical",
     "choice_probabilities", "constrained_transition", "coverage_area", "cpkf", "cvkf", "directions", "disc_probability",
     "estimates", "fit_path_loss", "floor_rate", "hall_map", "inscribed_disc", "is_open_area", "link_chain",
     "locate_access_point", "mixed_measure", "object_weights", "objects_behind",
     "office_building", "place", "position_fixes", "project",
-    "radio_map", "random_stops", "room_corridor", "run", "sample_measure", "scatter", "shortest_route",
+    "radio_map", "random_stops", "replicate", "room_corridor", "run", "sample_measure", "scatter", "shortest_route",
     "simulate_scans", "start", "step", "straighten", "time_shares", "total_link_length", "total_link_lengths",
     "trained", "tree_map", "walk_route",
 ]  # fmt: skip
