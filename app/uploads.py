@@ -70,8 +70,8 @@ def accepted(parameter: Parameter, name: str, content: bytes) -> str:
     """The key of a file that has passed its check; ValueError that names the file otherwise."""
     kind, name = parameter.file, plain_name(name)
     assert kind is not None
-    if len(content) <= files.MAX_FILE_BYTES:  # else `put` says it
-        if content and not kind.recognise(content):
+    if 0 < len(content) <= files.MAX_FILE_BYTES:  # else `put` says it
+        if not kind.recognise(content):
             raise ValueError(f"{name}: expected {kind.name} ({', '.join(kind.suffixes)})")
         try:
             kind.check(content)

@@ -100,6 +100,25 @@ class FakeBrowser:
         for phase in ("start", "update", "end"):
             self.send("SceneNodeDragMessage", phase=phase, name=node, end_position=list(to), **where)
 
+    def click(self, to: tuple[float, float, float]) -> None:
+        """Click into the scene where the camera sees the point `to` (display units)."""
+        origin = [float(v) for v in self._camera["position"]]
+        d = [b - a for a, b in zip(origin, to, strict=True)]
+        size = sum(v * v for v in d) ** 0.5
+        self.send("ScenePointerMessage", event_type="click", ray_origin=origin, ray_direction=[v / size for v in d],
+                  screen_pos=[[0.5, 0.5]], modifier=None)
+
+    def upload(self, label: str, name: str, content: bytes, size: int | None = None, parts: int = 1,
+               transfer: str = "t") -> None:
+        """Give a file to the upload button with this label; `size`: what is announced, if not the truth."""
+        button = self.widget(label)["uuid"]
+        self.send("FileTransferStartUpload", source_component_uuid=button, transfer_uuid=transfer, filename=name,
+                  mime_type="", part_count=parts, size_bytes=len(content) if size is None else size)
+        step = -(-len(content) // max(parts, 1))
+        for k in range(parts):
+            self.send("FileTransferPart", source_component_uuid=button, transfer_uuid=transfer, part_index=k,
+                      content=content[k * step:(k + 1) * step])
+
     def move_camera(self, position: tuple[float, float, float], look_at: tuple[float, float, float]) -> None:
         self._camera |= {"position": list(position), "look_at": list(look_at)}
         self._report_camera()

@@ -122,6 +122,55 @@ def compute(p, progress):
     return p.target
 '''
 
+PICKED = '''
+from dataclasses import dataclass
+from lessons.kit import files, scene
+from lessons.kit.lesson import Lesson, Readout, Target, View
+from lessons.kit.parameter import FileKind
+from lessons.kit.params import Names, Point, Points, datafile, draggable, names, points, switch
+
+def check(content):
+    if not content.startswith(b"NOTE 1"):
+        raise ValueError("line 1: expected NOTE 1")
+
+NOTE = FileKind("a note", (".note",), lambda content: content.startswith(b"NOTE"), check)
+CORNERS = {"a": (-40.0, -40.0), "b": (40.0, -40.0)}
+
+@dataclass(frozen=True, slots=True)
+class Params:
+    """What is set by clicks and files."""
+    route: Names = names((), limit=3)
+    fixes: Points = points(((10.0, 10.0),), limit=3, low=-50.0, high=50.0)
+    start: Point = draggable((0.0, 20.0), low=-50.0, high=50.0, click=True)
+    note: str = datafile(NOTE)
+    hidden: bool = switch(False)
+
+def compute(p, progress):
+    return len(files.get(p.note).content) if p.note else 0
+
+def view(p, size, at):
+    targets = [Target(xy, {"route": (*p.route, name)}) for name, xy in CORNERS.items() if len(p.route) < 3]
+    return View([scene.Points("corners", list(CORNERS.values()))], scene.Plane((-50.0, 50.0), (-50.0, 50.0)),
+                readouts=[Readout("bytes", size, "B")], targets=targets)
+
+LESSON = Lesson(Params, compute, view, unused=lambda p: {"fixes"} if p.hidden else ())
+'''
+
+PICKED_WORDS = '''---
+title: Picked
+summary: For tests.
+params: {route: {label: Route, hint: Clicks.}, fixes: {label: Fixes, hint: Clicks.},
+  start: {label: Start, hint: Click.}, note: {label: Note, hint: File.}, hidden: {label: Hidden, hint: No list.}}
+readouts: {bytes: Size}
+---
+# Idea
+Click.
+# What to try
+Load.
+# Questions
+None.
+'''
+
 SHORT_WORDS = '''---
 title: %s
 summary: For tests.
@@ -136,7 +185,7 @@ Slide.
 None.
 '''
 
-LESSONS = {"quick": (QUICK, QUICK_WORDS), "slow": (SLOW, SHORT_WORDS % "Slow"),
+LESSONS = {"quick": (QUICK, QUICK_WORDS), "picked": (PICKED, PICKED_WORDS), "slow": (SLOW, SHORT_WORDS % "Slow"),
            "fragile": (FRAGILE, SHORT_WORDS % "Fragile"), "stubborn": (STUBBORN, SHORT_WORDS % "Stubborn")}
 
 
