@@ -105,7 +105,7 @@ def run(building: Building, settings: Settings, folder: Path, progress: Callable
                 row = Row(technology, interval_s, route, seed, name, e.mean, e.median, e.p95, e.rmse,
                           float(o.right_floor.mean()), 1e3 * o.seconds_per_step)
                 rows.append(row)
-                writer.writerow(v if isinstance(v, str | int) else f"{v:.6g}" for v in asdict(row).values())
+                writer.writerow(_written(row))
             file.flush()
     progress(len(jobs), len(jobs))
     lines = list(table(rows, settings))
@@ -181,5 +181,9 @@ def _read(path: Path) -> list[Row]:
     with path.open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(kinds)
-        writer.writerows(asdict(row).values() for row in rows)
+        writer.writerows(map(_written, rows))
     return rows
+
+
+def _written(row: Row) -> list[str]:
+    return [str(v) if isinstance(v, str | int) else f"{v:.6g}" for v in asdict(row).values()]

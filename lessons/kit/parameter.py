@@ -79,7 +79,7 @@ class Parameter:
                     raise self._error(self.expected, value)
                 return tuple(value)
             case "file":
-                if value == "" or (isinstance(value, str) and self._is_ours(value)):
+                if isinstance(value, str) and (value == "" or self._is_ours(value)):
                     return value
                 raise self._error(self.expected, value)
             case "int" | "seed":
