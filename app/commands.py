@@ -51,14 +51,21 @@ def serve(options: argparse.Namespace) -> int:
 def list_lessons(options: argparse.Namespace) -> int:
     from app.check import overview
 
-    found = [overview(entry) for entry in _registry(options)]
+    found, broken = [], []
+    for entry in _registry(options):
+        try:
+            found.append(overview(entry))
+        except Exception as error:
+            broken.append(f"{entry.id} cannot be opened: {type(error).__name__}: {error}")
     if options.json:
         print(json.dumps(found, ensure_ascii=False, indent=1))
-        return 0
-    width = max(len(lesson["id"]) for lesson in found)
-    for lesson in found:
-        print(f"{lesson['id']:<{width}}  {lesson['title']}  ({', '.join(lesson['refs'])})")
-    return 0
+    else:
+        width = max((len(lesson["id"]) for lesson in found), default=0)
+        for lesson in found:
+            print(f"{lesson['id']:<{width}}  {lesson['title']}  ({', '.join(lesson['refs'])})")
+    for line in broken:
+        print(f"paikka: {line}", file=sys.stderr)
+    return 1 if broken else 0
 
 
 def run(options: argparse.Namespace) -> int:

@@ -1,11 +1,14 @@
 """Files named on the command line: which lessons take them is told by their content."""
 
+import logging
 from pathlib import Path
 
 from app.uploads import accepted
 from lessons.kit import files
 from lessons.kit.params import Parameter
 from lessons.registry import Registry
+
+log = logging.getLogger(__name__)
 
 
 def read(path: Path, registry: Registry) -> tuple[str, str]:
@@ -26,4 +29,10 @@ def read(path: Path, registry: Registry) -> tuple[str, str]:
 
 def file_parameters(registry: Registry) -> dict[str, Parameter]:
     """One parameter for each kind of file that the lessons take, by the kind's name."""
-    return {p.file.name: p for entry in registry for p in entry.parameters.values() if p.file is not None}
+    found: dict[str, Parameter] = {}
+    for entry in registry:
+        try:
+            found |= {p.file.name: p for p in entry.parameters.values() if p.file is not None}
+        except Exception:  # one broken lesson does not keep the others from their files
+            log.exception("lesson %s cannot be opened", entry.id)
+    return found

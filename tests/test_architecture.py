@@ -13,7 +13,7 @@ LAYERS = ("core", "lessons", "app", "tests")
 # What a layer may import besides Python's own library and itself.
 ALLOWED = {
     "core": {"numpy", "scipy"},
-    "lessons": {"core", "numpy", "scipy", "plotly", "yaml"},
+    "lessons": {"core", "numpy", "scipy", "plotly", "yaml", "pyrtklib"},    # the last: the optional reader of RINEX
 }
 BROWSER = {"viser", "websockets", "plotly", "PIL", "ziamath", "markdown_it", "rich"}
 SKIPPED = {"build", "dist", "node_modules", "__pycache__"}
@@ -166,7 +166,8 @@ def test_dependencies_are_declared():
 
     project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     declared = {re.split(r"[<>=\[ ]", text)[0].lower() for text in project["dependencies"]}
-    declared |= {re.split(r"[<>=\[ ]", text)[0].lower() for text in project["optional-dependencies"]["export"]}
+    for extra in ("export", "gnss"):
+        declared |= {re.split(r"[<>=\[ ]", text)[0].lower() for text in project["optional-dependencies"][extra]}
     distribution = {"yaml": "pyyaml", "PIL": "pillow", "markdown_it": "markdown-it-py", "ziafont": "ziamath",
                     "websockets": "viser", "rich": "viser"}      # the last three come with those
     wrong = []

@@ -8,7 +8,7 @@ from markdown_it import MarkdownIt
 from app.text.formula import typeset_or_show
 
 _MARKDOWN = MarkdownIt("commonmark", {"html": False, "typographer": False}).enable("table")
-_CODE_OR_MATH = re.compile(r"(`+)(?:.|\n)*?\1|\\\$|\$\$((?:.|\n)+?)\$\$|\$([^$\n]+?)\$")
+_CODE_OR_MATH = re.compile(r"(`+)(?:.|\n)*?\1|\\\$|\$\$((?:.|\n)+?)\$\$|\$((?:[^$\n]|\n(?!\s*\n))+?)\$")
 
 
 @lru_cache(maxsize=512)

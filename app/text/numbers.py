@@ -40,6 +40,8 @@ def readout_text(readout: Readout) -> str:
         return "\u2013"
     if isinstance(readout.value, str):
         return readout.value
+    if isinstance(readout.value, int):
+        return _sign(f"{readout.value:,}")
     return significant(float(readout.value), readout.digits)
 
 
@@ -71,8 +73,8 @@ def _superscript(number: int) -> str:
 def _piece(piece: object, digits: int) -> str:
     if isinstance(piece, str):
         return f'<span class="pk-tex">{typeset_or_show(piece)}</span>'
+    places = _places(np.asarray(piece, dtype=np.float64), digits) if np.asarray(piece).dtype.kind == "f" else 0
     array = np.asarray(piece, dtype=np.float64)
-    places = _places(array, digits)
     if array.ndim == 0:
         return f'<span class="pk-num">{_sign(f"{float(array):.{places}f}")}</span>'
     matrix = array[:, None] if array.ndim == 1 else array

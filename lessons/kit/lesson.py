@@ -63,7 +63,7 @@ class Timeline:
 class Readout:
     """One number for the user: its label stands in the words, its unit here.
 
-    value: a number, a text, or None (shown as a dash).  digits: significant digits.
+    value: a number (an int is shown whole), a text, or None (shown as a dash).  digits: significant digits.
     """
 
     name: str

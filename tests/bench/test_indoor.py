@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from core.indoor import AccessPoints, Walk, office_building, start, step
+from core.indoor import AccessPoints, Walk, office_building, simulate_scans, start, step, walk_route
 from tests.bench import at_most, faster, medians
 from tests.bench.indoor_loop import Loop, Walker
 
@@ -84,3 +84,24 @@ def test_step():
     at_most(f"{what}: against 5 ms", t["ours"], 5.0, 1)
     t = medians(3, ours=ours, loop=one_by_one)
     faster(f"{what}: against a loop over particles", t["ours"], PART * t["loop"], 25)
+
+
+@pytest.mark.bench
+def test_step_in_the_building_of_the_lessons():
+    """A cloud that follows a walker, with a scan of all access points that are heard."""
+    from lessons.indoor._building import building
+
+    house, rng = building(), np.random.default_rng(2)
+    points = house.transmitters["wlan"]
+    scans = simulate_scans(walk_route(house.graph, house.routes["corridors"]), points, rng)
+    belief = start(house.graph, N, rng, WALK)
+    for y in scans[:20]:
+        belief = step(house.graph, belief, y, points, rng, walk=WALK).after
+
+    def ours():
+        return step(house.graph, belief, scans[20], points, rng, walk=WALK, threshold=1.0)
+
+    what = f"graph filter step in the lessons' building, N = 10,000, {int((~np.isnan(scans[20])).sum())} heard"
+    t = medians(5, batch=5, ours=ours, noise=lambda: rng.standard_normal((N, 4)))
+    at_most(f"{what}: against 4 N normals", t["ours"], t["noise"], 12)
+    at_most(f"{what}: against 5 ms", t["ours"], 5.0, 1)
