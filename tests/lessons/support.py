@@ -1,12 +1,15 @@
 """What the tests of single lessons share: presets, results that are computed once, views and their numbers."""
 
-from dataclasses import replace
+from collections.abc import Iterator
+from dataclasses import fields, replace
 from functools import cache
 from types import ModuleType
 from typing import Any
 
+import numpy as np
 import ziamath
 
+from core.types import Gaussian
 from lessons.kit.lesson import Moment, View, no_progress
 from lessons.kit.params import parameters
 
@@ -67,3 +70,42 @@ class Desk:
 def typeset(latex: str) -> None:
     """Fails where the app cannot show this formula."""
     ziamath.Latex(latex)
+
+
+def check_formulas(view: View) -> None:
+    """Fails where the app cannot show a formula, or a number in it is not finite."""
+    for e in view.equations:
+        for piece in e.pieces:
+            if isinstance(piece, str):
+                typeset(piece)
+            else:
+                assert np.isfinite(piece).all(), f"{e.name}: {piece}"
+
+
+def check_plots(view: View) -> None:
+    """Fails where a plot has a point that is not finite."""
+    for name, figure in view.figures.items():
+        for trace in figure.data:
+            for values in (trace.x, trace.y):
+                assert np.isfinite(np.asarray(values, dtype=float)).all(), f"{name}: {trace.meta}"
+
+
+def names(view: View) -> set[str]:
+    """What is in the scene."""
+    return {item.name for item in view.scene}
+
+
+def everything(view: View) -> bytes:
+    """All numbers that a view holds, as float64: equal for equal views, and to be searched for what is not finite."""
+    return np.concatenate([np.ravel(v) for v in _numbers(view)]).astype(np.float64).tobytes()
+
+
+def _numbers(view: View) -> Iterator[Any]:
+    found = [getattr(item, field.name) for item in view.scene for field in fields(item)]
+    found += [values for figure in view.figures.values() for trace in figure.data for values in (trace.x, trace.y)]
+    found += [piece for e in view.equations for piece in e.pieces]
+    found += [readout.value for readout in view.readouts]
+    for value in found:
+        for part in value if isinstance(value, Gaussian) else (value,):
+            if np.asarray(part).dtype.kind in "biuf":        # no text, and nothing for None
+                yield part

@@ -1,39 +1,18 @@
 """What the lesson on the Bayes filter claims: exercise 3.10's posterior, and which cost each estimate minimises."""
 
-from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
-import ziamath
 
 from core import grid
 from lessons.filtering import bayes_filter as lesson
-from lessons.kit.lesson import Moment, no_progress
-from lessons.kit.params import parameters
+from lessons.kit.lesson import no_progress
+from tests.lessons.support import Desk, check_formulas, check_plots, names
 from tests.oracle import entry
 
-DEFAULT = lesson.Params()
-LAST = 3
-
-
-@cache
-def result(p):
-    return lesson.compute(p, no_progress)
-
-
-@cache
-def typeset(latex):
-    return ziamath.Latex(latex).svg()
-
-
-def preset(name):
-    changes = {k: v for k, v in lesson.LESSON.presets[name].items() if k not in ("step", "stage")}
-    return replace(DEFAULT, **changes)
-
-
-def shown(p, step=1, stage=LAST):
-    return lesson.view(p, result(p), Moment(step, stage))
+DESK = Desk(lesson)
+DEFAULT, preset, result = DESK.default, DESK.preset, DESK.result
+shown = DESK.view
 
 
 def test_exercise_3_10_leaves_two_intervals_with_the_mean_between_them():
@@ -47,7 +26,7 @@ def test_exercise_3_10_leaves_two_intervals_with_the_mean_between_them():
     assert step.law.cov[0, 0] == pytest.approx(expected["var"], rel=1e-4)
     assert step.update.evidence == pytest.approx(expected["evidence"], rel=1e-6)
     assert "practically 0" in shown(DEFAULT).note
-    assert {x.name: x.value for x in shown(DEFAULT).readouts}["near_mean"] == pytest.approx(0.0, abs=1e-9)
+    assert DESK.readouts(DEFAULT)["near_mean"] == pytest.approx(0.0, abs=1e-9)
 
 
 def test_three_estimates_have_three_answers():
@@ -61,8 +40,8 @@ def test_three_estimates_have_three_answers():
     spacing = step.places[1] - step.places[0]
     for i, best in enumerate((expected["mean"], expected["median"])):
         assert abs(step.places[step.costs[i].argmin()] - best) <= spacing
-    names = {i.name for i in shown(p, 0).scene}
-    assert {"mean", "mode", "hit", "posterior"} <= names and "likelihood" not in names
+    found = names(shown(p, 0))
+    assert {"mean", "mode", "hit", "posterior"} <= found and "likelihood" not in found
     assert [e.name for e in shown(p, 0).equations] == ["predict", "mean", "mode", "hit"]
 
 
@@ -113,7 +92,7 @@ def test_two_ranges_leave_two_mirrored_peaks():
 
 
 def test_a_measurement_that_the_prior_excludes_is_named():
-    p = replace(DEFAULT, sigma_w=0.0, y1=1.2, y2=-1.2)
+    p = DESK.params(sigma_w=0.0, y1=1.2, y2=-1.2)
     steps = result(p).steps
     assert steps[1].possible and not steps[2].possible
     np.testing.assert_array_equal(steps[2].update.posterior.weights, steps[1].update.posterior.weights)
@@ -124,28 +103,22 @@ def test_stages_accumulate_and_the_camera_stands_still():
     for p in (DEFAULT, preset("in the plane")):
         cameras = {shown(p, k, s).camera for k in range(4) for s in range(4)}
         assert len(cameras) == 1
-        names = [{i.name for i in shown(p, 2, s).scene} for s in range(4)]
-        assert names[0] < names[1] < names[2] < names[3]
-        assert "likelihood" in names[1] and "posterior" in names[2] and "mean" in names[3]
+        found = [names(shown(p, 2, s)) for s in range(4)]
+        assert found[0] < found[1] < found[2] < found[3]
+        assert "likelihood" in found[1] and "posterior" in found[2] and "mean" in found[3]
         for k in (0, 1, 2):
             for s in range(4):
                 v = shown(p, k, s)
                 assert any(e.current for e in v.equations) and len(v.scene) <= 34
-                for e in v.equations:
-                    assert all(typeset(x) if isinstance(x, str) else np.isfinite(x).all() for x in e.pieces)
+                check_formulas(v)
 
 
-@pytest.mark.parametrize("name", list(parameters(lesson.Params)))
-def test_both_ends_of_every_parameter_are_finite(name):
-    spec = parameters(lesson.Params)[name]
-    ends = [(spec.low,) * 2, (spec.high,) * 2] if spec.kind == "point" else spec.options or (spec.low, spec.high)
-    space = "line" if name in lesson._LINE else "plane"
-    for end in ends:
-        p = replace(DEFAULT, **{"space": space, name: spec.validate(end)})
-        v = shown(p, 3)
-        assert all(isinstance(x.value, str) or np.isfinite(x.value) for x in v.readouts)
-        for f in v.figures.values():
-            assert all(np.isfinite(np.asarray(t.y, dtype=float)).all() for t in f.data)
+@pytest.mark.parametrize("changes", DESK.ends(), ids=str)
+def test_both_ends_of_every_parameter_are_finite(changes):
+    space = "line" if lesson._LINE.issuperset(changes) else "plane"
+    v = shown(DESK.params(**{"space": space, **changes}), 3)
+    assert all(isinstance(x.value, str) or np.isfinite(x.value) for x in v.readouts)
+    check_plots(v)
 
 
 def test_same_parameters_same_bytes():

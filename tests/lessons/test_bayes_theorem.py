@@ -1,7 +1,6 @@
 """What the lesson on Bayes' theorem claims: the oracle's numbers, areas that agree, priors that yield or do not."""
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -10,22 +9,14 @@ from core.kalman import update
 from core.sensors import Position
 from core.types import Gaussian
 from lessons.bayes_kalman import bayes_theorem as lesson
-from lessons.kit.lesson import Moment, no_progress
+from lessons.kit.lesson import no_progress
 from lessons.kit.params import parameters
 from lessons.kit.scene import Polygon, Polyline
+from tests.lessons.support import Desk, check_formulas, check_plots, names
 from tests.oracle import entry
 
-DEFAULT = lesson.Params()
-POSTERIOR = 3
-
-
-def preset(name):
-    return replace(DEFAULT, **{k: v for k, v in lesson.LESSON.presets[name].items() if k not in ("step", "stage")})
-
-
-@cache
-def result(p):
-    return lesson.compute(p, no_progress)
+DESK = Desk(lesson)
+DEFAULT, preset, result = DESK.default, DESK.preset, DESK.result
 
 
 def area(item):
@@ -45,7 +36,7 @@ def test_the_first_datum_has_the_numbers_of_the_oracle():
 def test_the_filled_areas_are_the_joint_probabilities_and_their_sum_the_evidence():
     r = result(DEFAULT)
     for k in (1, 2, 5):
-        items = {i.name: i for i in lesson.view(DEFAULT, r, Moment(k, POSTERIOR)).scene if isinstance(i, Polygon)}
+        items = {i.name: i for i in DESK.view(DEFAULT, k).scene if isinstance(i, Polygon)}
         joint = np.array([area(items[f"joint_{n}"]) for n in "ABC"])
         np.testing.assert_allclose(joint, r.mine[k - 1] * r.likelihood[k - 1], atol=1e-9)
         assert joint.sum() == pytest.approx(r.evidence[k - 1], abs=1e-9)
@@ -77,16 +68,16 @@ def test_a_rare_disease():
 def test_a_prior_of_zero_never_recovers():
     r = result(preset("never say never"))
     assert (r.mine[:, 1] == 0.0).all() and r.theirs[-1, 1] > 0.95
-    small = result(replace(preset("never say never"), prior_b=0.01))
+    small = result(preset("never say never", prior_b=0.01))
     assert small.mine[-1, 1] > 0.5
 
 
 def test_an_impossible_datum_has_evidence_zero_and_is_said():
-    p = replace(DEFAULT, prior_a=1.0, prior_b=0.0, prior_c=0.0, heard_a=0.0)
+    p = DESK.params(prior_a=1.0, prior_b=0.0, prior_c=0.0, heard_a=0.0)
     r = result(p)
     assert r.evidence[0] == 0.0
     np.testing.assert_array_equal(r.mine[1], r.mine[0])
-    assert "impossible" in lesson.view(p, r, Moment(1, POSTERIOR)).note
+    assert "impossible" in DESK.view(p, 1).note
 
 
 @pytest.mark.parametrize("p", [preset("two bells"), preset("a stubborn prior")])
@@ -109,8 +100,7 @@ def test_a_stubborn_prior_yields_slowly_and_the_evidence_notices():
     way = (r.laws[k, 0] - p.mean_m) / (p.true_x_m - p.mean_m)
     assert 0.2 < way < 0.5
     assert p.true_x_m - r.laws[k, 0] > 5 * r.laws[k, 1]                  # sure, and wrong
-    shown = {x.name: x.value for x in lesson.view(p, r, Moment(k, POSTERIOR)).readouts}
-    assert shown["factor"] < -1.0                                        # the flat prior foresaw the data far better
+    assert DESK.readouts(p, k)["factor"] < -1.0                     # the flat prior foresaw the data far better
 
 
 def test_the_coin_is_a_beta_law():
@@ -125,10 +115,10 @@ def test_the_coin_is_a_beta_law():
 
 @pytest.mark.parametrize("case", ["cells", "normal", "coin"])
 def test_stages_accumulate(case):
-    p = replace(DEFAULT, case=case)
-    views = [lesson.view(p, result(p), Moment(2, stage)) for stage in range(4)]
-    names = [{i.name for i in v.scene} for v in views]
-    assert names[0] < names[1] < names[2] < names[3]
+    p = DESK.params(case=case)
+    views = [DESK.view(p, 2, stage) for stage in range(4)]
+    found = [names(v) for v in views]
+    assert found[0] < found[1] < found[2] < found[3]
     for stage, v in enumerate(views):
         assert v.camera == views[0].camera
         assert [e.current for e in v.equations] == [i == stage for i in range(4)]
@@ -136,33 +126,29 @@ def test_stages_accumulate(case):
 
 def test_only_the_parameters_of_the_case_are_shown():
     every = set().union(*lesson.USED.values())
-    for case, names in lesson.USED.items():
-        assert set(lesson.unused(replace(DEFAULT, case=case))) == every - set(names)
+    for case, used in lesson.USED.items():
+        assert set(lesson.unused(DESK.params(case=case))) == every - set(used)
     assert set(parameters(lesson.Params)) == every | {"case", "seed"}
 
 
-CASES = [(case, name) for case, names in lesson.USED.items() for name in names]
+CASES = [(case, changes) for case, used in lesson.USED.items() for changes in DESK.ends() if set(used) >= set(changes)]
 
 
-@pytest.mark.parametrize("case, name", CASES)
-def test_both_ends_of_every_parameter_are_finite(case, name):
-    spec = parameters(lesson.Params)[name]
-    for value in spec.options or (spec.low, spec.high):
-        p = replace(replace(DEFAULT, case=case), **{name: spec.validate(value)})
-        for k in (0, 1, 30):
-            v = lesson.view(p, result(p), Moment(k, POSTERIOR))
-            for i in v.scene:
-                if isinstance(i, Polyline):
-                    assert np.isfinite(i.points).all()
-            for f in v.figures.values():
-                assert all(np.isfinite(t.x).all() and np.isfinite(t.y).all() for t in f.data)
-            for e in v.equations:
-                assert all(np.isfinite(x).all() for x in e.pieces if not isinstance(x, str))
+@pytest.mark.parametrize("case, changes", CASES, ids=str)
+def test_both_ends_of_every_parameter_are_finite(case, changes):
+    p = DESK.params(case=case, **changes)
+    for k in (0, 1, 30):
+        v = DESK.view(p, k)
+        for i in v.scene:
+            if isinstance(i, Polyline):
+                assert np.isfinite(i.points).all()
+        check_plots(v)
+        check_formulas(v)
 
 
 def test_same_parameters_same_bytes():
     for case in lesson.USED:
-        p = replace(DEFAULT, case=case)
+        p = DESK.params(case=case)
         a, b = (lesson.compute(p, no_progress) for _ in range(2))
         assert a.mine.tobytes() == b.mine.tobytes() and a.y.tobytes() == b.y.tobytes()
         assert lesson.compute(replace(p, seed=99), no_progress).y.tobytes() != a.y.tobytes()

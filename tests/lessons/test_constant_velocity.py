@@ -1,7 +1,6 @@
 """The constant-velocity model: Q of the oracle, the semigroup, and how far the approximations are off."""
 
 import itertools
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,43 +9,31 @@ from core.motion import constant_velocity
 from lessons.filtering import constant_velocity as lesson
 from lessons.filtering._constant_velocity_view import PROBABILITY
 from lessons.kit.lesson import Moment, no_progress
+from tests.lessons.support import Desk, check_plots, names
 from tests.oracle import entry
 
-DEFAULT = lesson.Params()
+DESK = Desk(lesson)
+DEFAULT, preset, result = DESK.default, DESK.preset, DESK.result
 AXIS = np.ix_([0, 2], [0, 2])
 MOVE, NOISE = range(2)
-
-
-def preset(name):
-    changes = {k: v for k, v in lesson.LESSON.presets[name].items() if k not in ("step", "stage")}
-    return replace(DEFAULT, **changes)
-
-
-def result(p):
-    return lesson.compute(p, no_progress)
-
-
-def names(view):
-    return {item.name for item in view.scene}
 
 
 @pytest.mark.parametrize("case", [0, 1])
 def test_one_step_has_the_phi_and_q_of_the_oracle(case):
     asked, expected = (entry("C3-01")[key]["cases"][case] for key in ("inputs", "expected"))
-    r = result(replace(DEFAULT, horizon_s=16.0 * asked["dt"], halvings=4, sigma_c=float(np.sqrt(asked["sc2"]))))
+    r = result(DESK.params(horizon_s=16.0 * asked["dt"], halvings=4, sigma_c=float(np.sqrt(asked["sc2"]))))
     np.testing.assert_allclose(r.motion.Phi[AXIS], expected["Phi1"], rtol=1e-12)
     np.testing.assert_allclose(r.motion.Q[AXIS], expected["Q1"], rtol=1e-12)
 
 
 def test_two_half_steps_are_one_step_in_the_formulas_too():
-    r = result(DEFAULT)
-    equations = {e.name: e.pieces for e in lesson.view(DEFAULT, r, Moment(3, NOISE)).equations}
+    equations = {e.name: e.pieces for e in DESK.view(DEFAULT, 3).equations}
     np.testing.assert_allclose(equations["halves"][-1], equations["noise"][-1], rtol=1e-12)
     np.testing.assert_allclose(equations["law"][-1], equations["moved"][-1] + equations["noise"][-1], rtol=1e-12)
 
 
 def test_paths_and_the_exact_prediction_do_not_depend_on_the_number_of_steps():
-    runs = [result(replace(DEFAULT, halvings=j)) for j in (0, 2, 6)]
+    runs = [result(DESK.params(halvings=j)) for j in (0, 2, 6)]
     for r in runs[1:]:
         assert r.paths.tobytes() == runs[0].paths.tobytes()
         np.testing.assert_allclose(r.laws.cov[-1], runs[0].laws.cov[-1], rtol=1e-12)
@@ -56,7 +43,7 @@ def test_paths_and_the_exact_prediction_do_not_depend_on_the_number_of_steps():
 @pytest.mark.parametrize("scheme", ["euler", "acceleration"])
 @pytest.mark.parametrize("halvings", [0, 2, 5])
 def test_the_approximations_fall_short_by_the_factors_of_the_text(scheme, halvings):
-    r = result(replace(DEFAULT, scheme=scheme, halvings=halvings))
+    r = result(DESK.params(scheme=scheme, halvings=halvings))
     k = np.arange(1, 2**halvings + 1)
     factor = (1 - 1 / k) * (1 - 1 / (2 * k)) if scheme == "euler" else 1 - 1 / (4 * k**2)
     np.testing.assert_allclose(r.rival_laws.cov[1:, 0, 0], factor * r.laws.cov[1:, 0, 0], rtol=1e-12, atol=1e-12)
@@ -80,7 +67,7 @@ def test_the_exact_ellipses_hold_the_paths_and_euler_s_do_not():
 
 
 def test_velocity_is_brownian_and_position_its_integral():
-    r = result(replace(DEFAULT, sigma_c=2.0))
+    r = result(DESK.params(sigma_c=2.0))
     steps = np.diff(r.paths[:, :, 2:], axis=0).reshape(lesson.FINE, -1)
     h = DEFAULT.horizon_s / lesson.FINE
     assert steps.std() == pytest.approx(2.0 * np.sqrt(h), rel=0.03)
@@ -92,7 +79,7 @@ def test_velocity_is_brownian_and_position_its_integral():
 
 
 def test_the_approximate_path_uses_the_same_brownian_motion():
-    few, many = (result(replace(DEFAULT, halvings=j)) for j in (2, 6))
+    few, many = (result(DESK.params(halvings=j)) for j in (2, 6))
     ends = [np.linalg.norm(r.rival_path[-1] - r.paths[-1, 0, :2]) for r in (few, many)]
     assert ends[0] > 15.0 > 3.0 > ends[1]
 
@@ -109,10 +96,10 @@ def test_example_20_carries_the_numbers_of_the_notes():
 
 def test_stages_accumulate():
     r = result(DEFAULT)
-    before, after = (lesson.view(DEFAULT, r, Moment(3, stage)) for stage in (MOVE, NOISE))
+    before, after = (DESK.view(DEFAULT, 3, stage) for stage in (MOVE, NOISE))
     assert {"moved", "motion", "fan_2"} <= names(before) and "law" not in names(before)
     assert {"law", "rival", "fan_2"} <= names(after)
-    assert before.camera == after.camera == lesson.view(DEFAULT, r, Moment(0, NOISE)).camera
+    assert before.camera == after.camera == DESK.view(DEFAULT, 0).camera
     running = {"mean": 0, "moved": 0, "noise": 1, "law": 1, "halves": 1, "rival": 1, "rival_law": 1}
     for stage, v in enumerate((before, after)):
         for e in v.equations:
@@ -124,14 +111,14 @@ def test_stages_accumulate():
 
 def test_a_picture_has_few_segments_and_few_nodes():
     for j in (0, 3, 6):
-        p = replace(DEFAULT, halvings=j)
-        v = lesson.view(p, result(p), Moment(2**j, NOISE))
+        p = DESK.params(halvings=j)
+        v = DESK.view(p, 2**j)
         assert len(v.scene) <= 32
         assert len(next(i for i in v.scene if i.name == "paths").pairs) < 1000
 
 
 def test_same_parameters_same_bytes_and_another_seed_another_path():
-    a, b, c = result(DEFAULT), result(DEFAULT), result(replace(DEFAULT, seed=7))
+    a, b, c = (lesson.compute(DESK.params(seed=seed), no_progress) for seed in (DEFAULT.seed, DEFAULT.seed, 7))
     assert a.paths.tobytes() == b.paths.tobytes() != c.paths.tobytes()
     assert a.rival_inside.tobytes() == b.rival_inside.tobytes()
 
@@ -140,12 +127,10 @@ def test_same_parameters_same_bytes_and_another_seed_another_path():
     dict(zip(("sigma_c", "horizon_s", "start_sigma_m", "halvings"), corner, strict=True))
     for corner in itertools.product((0.01, 10.0), (1.0, 120.0), (0.0, 50.0), (0, 6))], ids=str)
 def test_finite_at_the_corners(changes):
-    p = replace(DEFAULT, speed_mps=0.0, **changes)
+    p = DESK.params(speed_mps=0.0, **changes)
     r = result(p)
     assert all(np.isfinite(a).all() for a in (r.paths, r.rival_path, r.laws.cov, r.rival_laws.cov, r.spread, r.inside))
     for step in (0, 1, 2**p.halvings):
         v = lesson.view(p, r, Moment(step, NOISE))
         assert v.camera.x[1] > v.camera.x[0] and v.camera.y[1] > v.camera.y[0]
-        for figure in v.figures.values():
-            for trace in figure.data:
-                assert np.isfinite(trace.x).all() and np.isfinite(trace.y).all()
+        check_plots(v)

@@ -1,39 +1,20 @@
 """What the lesson on degeneracy claims: SIS collapses, resampling and better proposals help, ancestors are lost."""
 
-from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
-import ziamath
 
 from core.resampling import effective_sample_size
 from lessons.filtering import degeneracy as lesson
 from lessons.filtering._degeneracy_view import lines_alive
 from lessons.kit.lesson import Moment, no_progress
-from lessons.kit.params import parameters
+from tests.lessons.support import Desk, check_formulas, check_plots
 
-DEFAULT = lesson.Params()
+DESK = Desk(lesson)
+DEFAULT, preset, result = DESK.default, DESK.preset, DESK.result
+shown = DESK.view
 LAST = 2
 END = lesson.STEPS
-
-
-@cache
-def result(p):
-    return lesson.compute(p, no_progress)
-
-
-@cache
-def typeset(latex):
-    return ziamath.Latex(latex).svg()
-
-
-def preset(name, **changes):
-    return replace(DEFAULT, **{**lesson.LESSON.presets[name], **changes})
-
-
-def shown(p, step=END, stage=LAST):
-    return lesson.view(p, result(p), Moment(step, stage))
 
 
 def test_sis_ends_on_one_particle_and_sir_does_not():
@@ -47,7 +28,7 @@ def test_sis_ends_on_one_particle_and_sir_does_not():
 
 
 def test_it_is_no_accident_of_the_seed():
-    runs = [result(replace(DEFAULT, seed=s)) for s in range(6)]
+    runs = [result(DESK.params(seed=s)) for s in range(6)]
     assert all(r.sis.n_eff[-1] < 3.0 for r in runs)
     assert all(r.sir.n_eff[1:].mean() > 10.0 for r in runs)
 
@@ -65,7 +46,7 @@ def test_a_threshold_resamples_only_below_it():
     r = result(p)
     np.testing.assert_array_equal(r.sir.resampled[1:], r.sir.n_eff[1:] < 0.5 * p.n_particles)
     assert 0 < r.sir.resampled.sum() == 7
-    none = result(replace(DEFAULT, threshold=0.0))
+    none = result(DESK.params(threshold=0.0))
     np.testing.assert_array_equal(none.sis.before, none.sir.before)
 
 
@@ -76,8 +57,8 @@ def test_sharp_measurements_want_a_better_proposal():
     np.testing.assert_array_equal(prior.y, best.y)
     # All proposals that have seen a linear measurement draw from the same law.
     assert (prior.study[1:, 1] > 0.9).all() and prior.study[0, 1] < 0.2
-    np.testing.assert_allclose(result(replace(DEFAULT, proposal="ekf")).sis.before,
-                               result(replace(DEFAULT, proposal="ukf")).sis.before, atol=1e-6)
+    np.testing.assert_allclose(result(DESK.params(proposal="ekf")).sis.before,
+                               result(DESK.params(proposal="ukf")).sis.before, atol=1e-6)
 
 
 def test_more_particles_only_delay_the_collapse():
@@ -113,25 +94,21 @@ def test_stages_accumulate():
         for stage, v in enumerate(views):
             assert len(v.scene) <= 42
             assert any(e.current for e in v.equations)
-            for e in v.equations:
-                assert all(typeset(x) if isinstance(x, str) else np.isfinite(x).all() for x in e.pieces)
+            check_formulas(v)
             measured = next((len(i.positions) for i in v.scene if i.name == "sis_y"), 0)
             assert measured == (step if stage else step - 1)
 
 
-@pytest.mark.parametrize("name", list(parameters(lesson.Params)))
-def test_both_ends_of_every_parameter_are_finite(name):
-    spec = parameters(lesson.Params)[name]
-    for end in spec.options or (spec.low, spec.high):
-        p = replace(DEFAULT, **{"n_particles": 10, "sensor": "mast", name: spec.validate(end)})
-        for step in (0, END):
-            v = shown(p, step)
-            assert all(np.isfinite(x.value) for x in v.readouts)
-            for f in v.figures.values():
-                assert all(np.isfinite(np.asarray(t.y, dtype=float)).all() for t in f.data)
+@pytest.mark.parametrize("changes", DESK.ends(), ids=str)
+def test_both_ends_of_every_parameter_are_finite(changes):
+    p = DESK.params(**{"n_particles": 10, "sensor": "mast", **changes})
+    for step in (0, END):
+        v = shown(p, step)
+        assert all(np.isfinite(x.value) for x in v.readouts)
+        check_plots(v)
 
 
 def test_same_parameters_same_bytes():
     a, b = (lesson.compute(DEFAULT, no_progress) for _ in range(2))
     assert a.sir.x.tobytes() == b.sir.x.tobytes() and a.study.tobytes() == b.study.tobytes()
-    assert lesson.compute(replace(DEFAULT, seed=2), no_progress).y.tobytes() != a.y.tobytes()
+    assert lesson.compute(DESK.params(seed=2), no_progress).y.tobytes() != a.y.tobytes()

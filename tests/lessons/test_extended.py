@@ -1,7 +1,6 @@
 """One update of the extended filter: the oracle's numbers, where the tangent fails, and when iterating helps."""
 
 import itertools
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,25 +10,13 @@ from lessons.filtering import extended as lesson
 from lessons.filtering._extended_curves import clipped, level_line, tangent_line
 from lessons.filtering._extended_model import exact_posterior, sensor_of, share_inside
 from lessons.kit.lesson import Moment, no_progress
-from lessons.kit.params import parameters
+from tests.lessons.support import Desk, check_plots, names
 from tests.oracle import entry
 
-DEFAULT = lesson.Params()
+DESK = Desk(lesson)
+DEFAULT, preset, result = DESK.default, DESK.preset, DESK.result
 PRIOR, LIKELIHOOD, POSTERIOR, TANGENT, UPDATE = range(5)
 SENSORS = ("range", "bearing", "difference", "two_ranges")
-
-
-def preset(name):
-    changes = {k: v for k, v in lesson.LESSON.presets[name].items() if k not in ("step", "stage")}
-    return replace(DEFAULT, **changes)
-
-
-def result(p):
-    return lesson.compute(p, no_progress)
-
-
-def names(view):
-    return {item.name for item in view.scene}
 
 
 def test_example_22_is_the_oracle_s():
@@ -79,7 +66,7 @@ def test_the_share_falls_as_the_prior_widens():
     assert shares[0] == pytest.approx([0.68, 0.68], abs=0.02)
     assert shares[-1, 0] < 0.05 < 0.5 < shares[-1, 1]
     for name in SENSORS:
-        r = result(replace(DEFAULT, sensor=name))
+        r = result(DESK.params(sensor=name))
         assert r.shares[0, 0] == pytest.approx(0.68, abs=0.04)         # a narrow prior sees a straight line
 
 
@@ -97,23 +84,23 @@ def test_iterations_may_not_settle():
     moves = np.linalg.norm(np.diff(r.points, axis=0), axis=1)
     assert (moves[-3:] > 20.0).all()
     assert r.inside[0] > 0.6 > 0.4 > r.inside[-1]
-    assert "do not settle" in lesson.view(p, r, Moment(9, UPDATE)).note
-    assert lesson.view(p, r, Moment(0, UPDATE)).note == ""
+    assert "do not settle" in DESK.view(p, 9).note
+    assert DESK.view(p, 0).note == ""
 
 
 def test_a_round_prior_and_one_range_need_no_iterations():
-    r = result(replace(DEFAULT, sigma_x_m=20.0, sigma_y_m=20.0, correlation=0.0))
+    r = result(DESK.params(sigma_x_m=20.0, sigma_y_m=20.0, correlation=0.0))
     np.testing.assert_allclose(r.points[2:], np.tile(r.points[1], (lesson.ITERATIONS - 1, 1)), atol=1e-9)
 
 
 def test_bend_of_a_range_is_what_the_text_says():
-    r = result(replace(DEFAULT, mean=(0.0, 400.0), sigma_x_m=20.0, sigma_y_m=20.0, correlation=0.0))
+    r = result(DESK.params(mean=(0.0, 400.0), sigma_x_m=20.0, sigma_y_m=20.0, correlation=0.0))
     assert r.bend == pytest.approx(np.sqrt(3) * 20.0**2 / (2 * 400.0 * DEFAULT.sigma_m), rel=0.03)
 
 
 @pytest.mark.parametrize("name", SENSORS)
 def test_the_grid_agrees_with_a_finer_one(name):
-    p = replace(DEFAULT, sensor=name)
+    p = DESK.params(sensor=name)
     r = result(p)
     fine = exact_posterior(r.prior, r.y, r.sensor, 400, 160)
     for law in (r.moments, r.updates[0].posterior):
@@ -122,7 +109,7 @@ def test_the_grid_agrees_with_a_finer_one(name):
 
 @pytest.mark.parametrize("name", SENSORS)
 def test_level_lines_and_tangents_are_where_they_should_be(name):
-    p = replace(DEFAULT, sensor=name)
+    p = DESK.params(sensor=name)
     sensor, x = sensor_of(p), np.array(p.mean)
     y = sensor.h(np.array([-30.0, 50.0]))
     for k, value in enumerate(y):
@@ -136,7 +123,7 @@ def test_level_lines_and_tangents_are_where_they_should_be(name):
 
 
 def test_no_line_where_nothing_can_be():
-    difference = sensor_of(replace(DEFAULT, sensor="difference"))
+    difference = sensor_of(DESK.params(sensor="difference"))
     assert len(level_line(difference, 0, 70.0, 100.0)) == 0             # longer than the baseline of 60 m
     assert len(level_line(sensor_of(DEFAULT), 0, -1.0, 100.0)) == 0
     assert len(tangent_line(np.zeros(2), 1.0, np.zeros(2), 100.0)) == 0
@@ -151,7 +138,7 @@ def test_clipping_keeps_what_lies_in_the_box():
 
 def test_stages_accumulate_and_carry_the_numbers():
     r = result(DEFAULT)
-    views = [lesson.view(DEFAULT, r, Moment(0, stage)) for stage in range(5)]
+    views = [DESK.view(DEFAULT, 0, stage) for stage in range(5)]
     for earlier, later in itertools.pairwise(views):
         assert names(earlier) - {"likelihood"} < names(later)           # the posterior takes the likelihood's place
         assert earlier.camera == later.camera
@@ -162,16 +149,16 @@ def test_stages_accumulate_and_carry_the_numbers():
         for e in v.equations:
             assert e.current == (running[e.name] == stage)
             assert any(not isinstance(x, str) for x in e.pieces) == (running[e.name] <= stage)
-    second = {e.name: e.pieces for e in lesson.view(DEFAULT, r, Moment(1, UPDATE)).equations}
+    second = {e.name: e.pieces for e in DESK.view(DEFAULT, 1).equations}
     np.testing.assert_allclose(second["mean"][-1], r.prior.mean + second["gain"][-1] @ second["innovation"][-1])
     np.testing.assert_allclose(second["innovation"][-1], second["innovation"][2] - second["innovation"][4])
-    assert {"ekf", "iterated", "iterates"} <= names(lesson.view(DEFAULT, r, Moment(1, UPDATE)))
+    assert {"ekf", "iterated", "iterates"} <= names(DESK.view(DEFAULT, 1))
 
 
 def test_bearings_are_shown_in_degrees():
     p = preset("a bearing")
     r = result(p)
-    v = lesson.view(p, r, Moment(0, UPDATE))
+    v = DESK.view(p, 0)
     shown = {x.name: x for x in v.readouts}["y"]
     assert shown.unit == "°" and shown.value == pytest.approx(np.degrees(np.arctan2(10.0, 60.0)))
     numbers = {e.name: e.pieces for e in v.equations}
@@ -185,18 +172,15 @@ def test_only_what_matters_is_shown():
 
 
 def ends():
-    found = [{"mean": (0.0, 0.0)}, {"sensor": "difference", "station_2": (0.0, 0.0)}, {"truth": (0.0, 0.0)}]
-    for name, q in parameters(lesson.Params).items():
-        for value in q.options or (q.low, q.high):
-            found.append({name: (value,) * 2 if q.kind == "point" else value})
+    here = [{"mean": (0.0, 0.0)}, {"sensor": "difference", "station_2": (0.0, 0.0)}, {"truth": (0.0, 0.0)}]
     extreme = ({"mean": (0.0, 0.0)}, {"sigma_x_m": 60.0, "sigma_y_m": 60.0}, {"truth": (1000.0, -1000.0)},
                {"station_1": (-1000.0, 1000.0)})
-    return found + [{"sensor": s, **e} for s in SENSORS for e in extreme]
+    return here + DESK.ends() + [{"sensor": s, **e} for s in SENSORS for e in extreme]
 
 
 @pytest.mark.parametrize("changes", ends(), ids=str)
 def test_finite_everywhere(changes):
-    p = replace(DEFAULT, **changes)
+    p = DESK.params(**changes)
     r = result(p)
     assert all(np.isfinite(a).all() for a in (r.points, r.cost, r.inside, r.off, r.bent, r.box, r.likelihood, r.shares))
     for i in (0, lesson.ITERATIONS - 1):
@@ -207,12 +191,10 @@ def test_finite_everywhere(changes):
                 assert np.isfinite(np.asarray(getattr(item, field, 0.0), dtype=float)).all()
             law = getattr(item, "gaussian", None)
             assert not isinstance(law, Gaussian) or np.isfinite(law.cov).all()
-    for figure in v.figures.values():
-        for trace in figure.data:
-            assert np.isfinite(trace.x).all() and np.isfinite(trace.y).all()
+    check_plots(v)
 
 
 def test_same_parameters_same_bytes():
-    a, b = result(DEFAULT), result(DEFAULT)
+    a, b = (lesson.compute(DEFAULT, no_progress) for _ in range(2))
     assert a.exact.weights.tobytes() == b.exact.weights.tobytes() and a.points.tobytes() == b.points.tobytes()
     assert a.shares.tobytes() == b.shares.tobytes()

@@ -1,7 +1,5 @@
 """What the laboratory shows: who loses the track of Example 22, who is the same filter as whom, who is honest."""
 
-from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
@@ -9,19 +7,11 @@ import pytest
 from lessons.filtering import filter_lab as lesson
 from lessons.kit.lesson import Cancelled, Moment, no_progress
 from lessons.kit.params import parameters
+from tests.lessons.support import Desk, names
 from tests.oracle import entry
 
-DEFAULT = lesson.Params()
-
-
-@cache
-def result(p):
-    return lesson.compute(p, no_progress)
-
-
-def preset(name):
-    changes = {k: v for k, v in lesson.LESSON.presets[name].items() if k not in ("step", "stage")}
-    return replace(DEFAULT, **changes)
+DESK = Desk(lesson)
+DEFAULT, preset, result = DESK.default, DESK.preset, DESK.result
 
 
 def final(r, name):
@@ -64,7 +54,7 @@ def test_in_example_20_the_kalman_filters_are_one_filter():
 
 
 def test_with_honest_assumptions_nees_and_coverage_are_right():
-    p = replace(preset("Example 20"), runs=200, pf=False, mixture=False, ukf=False)
+    p = preset("Example 20", runs=200, pf=False, mixture=False, ukf=False)
     r = result(p)
     m = r.many["ekf"]
     assert m.coverage == pytest.approx([0.68, 0.95], abs=0.025)
@@ -80,22 +70,22 @@ def test_a_third_station_reconciles_everybody():
 
 
 def test_fixes_from_bearings_throw_something_away():
-    many = result(replace(preset("bearings only"), pf=False)).many
+    many = result(preset("bearings only", pf=False)).many
     assert many["kf"].total_rmse > 1.3 * many["ekf"].total_rmse
     assert many["kf"].coverage[1] < many["ekf"].coverage[1] - 0.1
 
 
 def test_gnss_is_linear_at_its_distance_and_hard_for_particles():
-    p = replace(preset("GNSS with clock"), runs=20, n_particles=1000)
+    p = preset("GNSS with clock", runs=20, n_particles=1000)
     r = result(p)
     np.testing.assert_allclose(r.tracks["ukf"].law.mean, r.tracks["ekf"].law.mean, atol=0.01)
     assert r.many["pf"].total_rmse > 1.2 * r.many["ekf"].total_rmse
-    assert "grid" not in result(replace(preset("GNSS with clock"), grid=True, pf=False)).tracks
+    assert "grid" not in result(preset("GNSS with clock", grid=True, pf=False)).tracks
 
 
 def test_the_grid_and_the_particles_agree_in_example_22():
     """The grid is the reference: a large cloud has its mean and spread."""
-    r = result(replace(DEFAULT, grid=True, n_particles=8000, mixture=False))
+    r = result(DESK.params(grid=True, n_particles=8000, mixture=False))
     g, c = r.tracks["grid"].law, r.tracks["pf"].law
     sd = np.sqrt(np.diagonal(g.cov[10:, :2, :2], axis1=1, axis2=2))
     assert (np.abs(g.mean[10:, :2] - c.mean[10:, :2]) < 0.5 * sd).all()
@@ -103,22 +93,22 @@ def test_the_grid_and_the_particles_agree_in_example_22():
 
 
 def test_one_component_is_an_ekf():
-    r = result(replace(DEFAULT, components=1, scenario="example_20", pf=False))
+    r = result(DESK.params(components=1, scenario="example_20", pf=False))
     np.testing.assert_allclose(r.tracks["mixture"].law.mean, r.tracks["ekf"].law.mean, atol=1e-6)
 
 
 def test_filters_do_not_change_each_other_nor_the_world():
-    base, alone = result(DEFAULT), result(replace(DEFAULT, ekf=False, pf=False, kf=True))
+    base, alone = result(DEFAULT), result(DESK.params(ekf=False, pf=False, kf=True))
     np.testing.assert_array_equal(base.truth, alone.truth)
     np.testing.assert_array_equal(base.y, alone.y)
     np.testing.assert_array_equal(base.tracks["mixture"].law.mean, alone.tracks["mixture"].law.mean)
-    many = result(replace(DEFAULT, runs=10, mixture=False))
+    many = result(DESK.params(runs=10, mixture=False))
     np.testing.assert_array_equal(base.tracks["pf"].law.mean, many.tracks["pf"].law.mean)
 
 
 def test_many_runs_report_their_progress_and_can_be_cancelled():
     seen = []
-    lesson.compute(replace(DEFAULT, runs=20, n_particles=100, mixture=False), seen.append)
+    lesson.compute(DESK.params(runs=20, n_particles=100, mixture=False), seen.append)
     assert seen == sorted(seen) and len(seen) > 20 and seen[-1] == pytest.approx(1.0)
 
     def cancel(fraction):
@@ -126,13 +116,12 @@ def test_many_runs_report_their_progress_and_can_be_cancelled():
             raise Cancelled
 
     with pytest.raises(Cancelled):
-        lesson.compute(replace(DEFAULT, runs=20, n_particles=100, mixture=False), cancel)
+        lesson.compute(DESK.params(runs=20, n_particles=100, mixture=False), cancel)
 
 
 def test_no_filter_at_all_is_a_picture_too():
-    p = replace(DEFAULT, ekf=False, ukf=False, pf=False, mixture=False, runs=10)
-    v = lesson.view(p, result(p), Moment(40, 0))
-    assert {"truth", "truth_now"} <= {i.name for i in v.scene}
+    p = DESK.params(ekf=False, ukf=False, pf=False, mixture=False, runs=10)
+    assert {"truth", "truth_now"} <= names(DESK.view(p, 40, 0))
 
 
 @pytest.mark.parametrize("scenario", lesson.NAMES)
@@ -141,7 +130,7 @@ def test_every_scenario_is_finite_at_the_ends_of_its_settings(scenario, truth):
     specs = parameters(lesson.Params)
     for value, runs in (("low", 10), ("high", 0)):
         settings = {name: specs[name].validate(getattr(specs[name], value)) for name in ("kappa", "components")}
-        p = replace(DEFAULT, scenario=scenario, truth=truth, kf=True, n_particles=100, runs=runs, **settings)
+        p = DESK.params(scenario=scenario, truth=truth, kf=True, n_particles=100, runs=runs, **settings)
         r = result(p)
         for t in r.tracks.values():
             assert np.isfinite(t.error).all() and np.isfinite(t.nees).all()
@@ -150,7 +139,7 @@ def test_every_scenario_is_finite_at_the_ends_of_its_settings(scenario, truth):
 
 
 def test_same_parameters_same_bytes():
-    p = replace(DEFAULT, runs=10, n_particles=200, components=4)
+    p = DESK.params(runs=10, n_particles=200, components=4)
     a, b = (lesson.compute(p, no_progress) for _ in range(2))
     assert a.y.tobytes() == b.y.tobytes() and a.clouds.tobytes() == b.clouds.tobytes()
     shown = [[(x.name, x.value) for x in lesson.view(p, r, Moment(40, 0)).readouts] for r in (a, b)]

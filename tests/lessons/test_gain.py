@@ -1,33 +1,19 @@
 """What the lesson on the gain claims: the bowl, its bottom, its price for other gains, and which formula lies."""
 
-from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
 
 from core.linear_update import joseph_form
 from lessons.bayes_kalman import gain as lesson
-from lessons.kit.lesson import Moment, no_progress
-from lessons.kit.params import parameters
+from lessons.kit.lesson import no_progress
 from lessons.kit.scene import Orbit, Plane
+from tests.lessons.support import Desk, check_formulas, check_plots, names
 from tests.oracle import entry
 
-DEFAULT = lesson.Params()
-SLOPE = 3
-
-
-def preset(name):
-    return replace(DEFAULT, **{k: v for k, v in lesson.LESSON.presets[name].items() if k not in ("step", "stage")})
-
-
-@cache
-def result(p):
-    return lesson.compute(p, no_progress)
-
-
-def shown(p, step):
-    return {x.name: x.value for x in lesson.view(p, result(p), Moment(step, SLOPE)).readouts}
+DESK = Desk(lesson)
+DEFAULT, preset, result = DESK.default, DESK.preset, DESK.result
+shown = DESK.readouts
 
 
 def test_the_default_has_the_numbers_of_the_oracle():
@@ -82,7 +68,7 @@ def test_between_zero_and_the_best_gain_the_short_form_is_too_large():
 
 @pytest.mark.parametrize("P, R", [(4.0, 2.0), (2.0, 2.0), (0.1, 40.0), (40.0, 0.05)])
 def test_the_scalar_gain_is_trust_between_0_and_1(P, R):
-    r = result(replace(DEFAULT, model="one", P_m2=P, R_m2=R))
+    r = result(DESK.params(model="one", P_m2=P, R_m2=R))
     K = float(r.step.gain[0, 0])
     assert pytest.approx(P / (P + R)) == K and 0 < K < 1
     assert r.step.posterior.cov[0, 0] == pytest.approx(K * R) and min(P, R) > K * R
@@ -95,7 +81,7 @@ def test_gain_one_leaves_the_measurement_alone():
 
 
 def test_the_eigenvalues_of_kh_are_trust_too():
-    for p in (DEFAULT, replace(DEFAULT, P_m2=40.0, R_m2=0.05), replace(DEFAULT, P_m2=0.1, R_m2=40.0)):
+    for p in (DEFAULT, DESK.params(P_m2=40.0, R_m2=0.05), DESK.params(P_m2=0.1, R_m2=40.0)):
         r = result(p)
         assert (r.trust > 0).all() and (r.trust < 1).all()
         assert (np.diff(r.trust, axis=0) < 0).all()                       # more noise, less trust
@@ -104,9 +90,8 @@ def test_the_eigenvalues_of_kh_are_trust_too():
 
 def test_the_bowl_of_a_row_is_the_variance_of_its_coordinate():
     for row in ("1", "2"):
-        p = replace(DEFAULT, row=row)
-        v = lesson.view(p, result(p), Moment(27, SLOPE))
-        items = {i.name: i for i in v.scene}
+        p = DESK.params(row=row)
+        items = DESK.items(p, 27)
         bowl, best = items["joseph"], result(p).step.gain[int(row) - 1]
         assert (bowl.x[bowl.z.argmin() % len(bowl.x)], bowl.y[bowl.z.argmin() // len(bowl.x)]) == pytest.approx(best)
         other = result(p).step.gain.copy()
@@ -123,10 +108,10 @@ def test_the_bowl_of_a_row_is_the_variance_of_its_coordinate():
 
 def test_stages_show_one_thing_after_the_other():
     for model, kind in (("pair", Orbit), ("one", Plane)):
-        p = replace(DEFAULT, model=model)
-        views = [lesson.view(p, result(p), Moment(24, stage)) for stage in range(4)]
-        names = [{i.name for i in v.scene} for v in views]
-        assert names[0] < names[1] < names[2] <= names[3]
+        p = DESK.params(model=model)
+        views = [DESK.view(p, 24, stage) for stage in range(4)]
+        found = [names(v) for v in views]
+        assert found[0] < found[1] < found[2] <= found[3]
         for v in views:
             assert isinstance(v.camera, kind) and v.camera == views[0].camera
             assert any(e.current for e in v.equations)
@@ -134,27 +119,23 @@ def test_stages_show_one_thing_after_the_other():
                                                                       reverse=True)
 
 
-@pytest.mark.parametrize("name", [n for n, s in parameters(lesson.Params).items() if s.kind != "seed"])
-def test_both_ends_of_every_parameter_are_finite(name):
-    spec = parameters(lesson.Params)[name]
+@pytest.mark.parametrize("changes", [e for e in DESK.ends() if "seed" not in e], ids=str)
+def test_both_ends_of_every_parameter_are_finite(changes):
     for model in ("pair", "one"):
-        for value in spec.options or (spec.low, spec.high):
-            p = replace(replace(DEFAULT, model=model), **{name: spec.validate(value)})
-            for step in (0, 20, 40):
-                v = lesson.view(p, result(p), Moment(step, SLOPE))
-                for f in v.figures.values():
-                    assert all(np.isfinite(t.x).all() and np.isfinite(t.y).all() for t in f.data)
-                for e in v.equations:
-                    assert all(np.isfinite(x).all() for x in e.pieces if not isinstance(x, str))
+        p = DESK.params(**{"model": model, **changes})
+        for step in (0, 20, 40):
+            v = DESK.view(p, step)
+            check_plots(v)
+            check_formulas(v)
 
 
 def test_a_variance_that_cannot_be_drawn_is_said():
     p = preset("one coordinate")
-    assert "no law has such a variance" in lesson.view(p, result(p), Moment(40, SLOPE)).note
-    assert lesson.view(p, result(p), Moment(20, SLOPE)).note == ""
+    assert "no law has such a variance" in DESK.view(p, 40).note
+    assert DESK.view(p, 20).note == ""
 
 
 def test_same_parameters_same_bytes():
     a, b = (lesson.compute(DEFAULT, no_progress) for _ in range(2))
     assert a.perturbed.real.tobytes() == b.perturbed.real.tobytes() and a.trust.tobytes() == b.trust.tobytes()
-    assert lesson.compute(replace(DEFAULT, seed=2), no_progress).sweep.real.tobytes() != a.sweep.real.tobytes()
+    assert lesson.compute(DESK.params(seed=2), no_progress).sweep.real.tobytes() != a.sweep.real.tobytes()

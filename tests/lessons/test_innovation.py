@@ -1,39 +1,27 @@
 """What the lesson on the innovation claims: the oracle's gate, garbage kept out, four wrong noises told apart."""
 
 import itertools
-from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from lessons.filtering import innovation as lesson
 from lessons.kit.lesson import Moment, no_progress
+from tests.lessons.support import Desk, check_plots, names
 from tests.oracle import entry
 
-DEFAULT = lesson.Params()
+DESK = Desk(lesson)
+DEFAULT, preset, result = DESK.default, DESK.preset, DESK.result
 PREDICT, INNOVATION, TEST, UPDATE = range(4)
-
-
-def preset(name):
-    changes = {k: v for k, v in lesson.LESSON.presets[name].items() if k not in ("step", "stage")}
-    return replace(DEFAULT, **changes)
-
-
-def result(p):
-    return lesson.compute(p, no_progress)
 
 
 def rmse(r, f):
     return float(np.sqrt(np.square(f.step.posterior.mean[:, :2] - r.truth[1:, :2]).sum(axis=1).mean()))
 
 
-def names(view):
-    return {item.name for item in view.scene}
-
-
 def test_the_first_step_is_the_oracle_s():
     asked, expected = entry("C3-10")["inputs"], entry("C3-10")["expected"]
-    p = replace(preset("145 m off at the first step"), garbage=tuple(float(v) for v in asked["y"]))
+    p = preset("145 m off at the first step", garbage=tuple(float(v) for v in asked["y"]))
     r = result(p)
     np.testing.assert_allclose(r.initial.mean, asked["x0"])
     np.testing.assert_allclose(r.initial.cov, asked["P0"])
@@ -57,14 +45,14 @@ def test_the_gate_keeps_garbage_out_and_halves_the_error():
     assert not r.used.accepted[DEFAULT.garbage_step - 1]               # the user's own, at the step shown first
     assert lesson.timeline(DEFAULT).start == DEFAULT.garbage_step
     assert rmse(r, r.plain) > 1.8 * rmse(r, r.used)
-    assert {"plain", "rejected", "garbage", "gate"} <= names(lesson.view(DEFAULT, r, Moment(38, UPDATE)))
+    assert {"plain", "rejected", "garbage", "gate"} <= names(DESK.view(DEFAULT, 38))
 
 
 def test_without_a_gate_the_filter_is_the_plain_one():
     r, gated = result(preset("no gate")), result(DEFAULT)
     assert r.used.accepted.all()
     np.testing.assert_array_equal(r.used.step.posterior.mean, gated.plain.step.posterior.mean)
-    scene = names(lesson.view(preset("no gate"), r, Moment(50, UPDATE)))
+    scene = names(DESK.view(preset("no gate"), 50))
     assert "rejected" not in scene and "plain" not in scene
     assert r.many_nis > 4.0                                            # garbage shows in the mean
 
@@ -78,7 +66,7 @@ def test_nis_and_correlation_together_tell_which_noise_is_wrong(name, high, posi
         assert nis > 2.5 if high else nis < 1.6
     for first in (float(r.many_correlation[0]), float(r.correlation[0])):
         assert first > 0.15 if positive else first < -0.08
-    right = result(replace(preset(name), r_ratio=1.0, q_ratio=1.0))
+    right = result(preset(name, r_ratio=1.0, q_ratio=1.0))
     assert right.many_nis == pytest.approx(2.0, abs=0.1)
     # 100 tracks of 60 two-dimensional innovations: a standard deviation of 0.009
     assert np.abs(right.many_correlation).max() < 0.035
@@ -91,8 +79,8 @@ def test_the_adaptive_filter_finds_the_noise():
     assert (sigma[0] < [12.0, 20.0]).all()
     np.testing.assert_allclose(sigma[-20:].mean(axis=0), [30.0, 50.0], rtol=0.25)
     assert rmse(r, r.used) < 0.8 * rmse(r, r.plain)
-    assert "noise" in lesson.view(p, r, Moment(60, UPDATE)).figures
-    forgets_nothing = result(replace(p, memory=0.99))
+    assert "noise" in DESK.view(p, 60).figures
+    forgets_nothing = result(preset("R learnt from the residuals", memory=0.99))
     assert np.sqrt(forgets_nothing.used.R[-1, 0, 0]) < sigma[-1, 0]
 
 
@@ -105,25 +93,23 @@ def test_a_tight_gate_with_a_small_q_locks_the_truth_out():
 
 
 def test_more_garbage_leaves_the_rest_alone():
-    few, many = result(replace(DEFAULT, share_percent=5.0)), result(replace(DEFAULT, share_percent=30.0))
+    few, many = result(DESK.params(share_percent=5.0)), result(DESK.params(share_percent=30.0))
     assert few.garbage.sum() < many.garbage.sum() and many.garbage[few.garbage].all()
     np.testing.assert_array_equal(few.truth, many.truth)
     np.testing.assert_array_equal(few.y[~many.garbage], many.y[~many.garbage])
-    clean = result(replace(DEFAULT, share_percent=0.0, garbage_step=0))
-    assert not clean.garbage.any()
-    assert "rejected" not in names(lesson.view(replace(DEFAULT, share_percent=0.0, garbage_step=0), clean,
-                                               Moment(3, UPDATE)))
+    clean = DESK.params(share_percent=0.0, garbage_step=0)
+    assert not result(clean).garbage.any()
+    assert "rejected" not in names(DESK.view(clean, 3))
 
 
 def test_beliefs_change_nothing_in_the_world():
-    r, other = result(DEFAULT), result(replace(DEFAULT, r_ratio=3.0, q_ratio=0.2, treatment="adaptive"))
+    r, other = result(DEFAULT), result(DESK.params(r_ratio=3.0, q_ratio=0.2, treatment="adaptive"))
     np.testing.assert_array_equal(r.truth, other.truth)
     np.testing.assert_array_equal(r.y, other.y)
 
 
 def test_stages_accumulate_and_carry_the_numbers():
-    r = result(DEFAULT)
-    views = [lesson.view(DEFAULT, r, Moment(38, stage)) for stage in range(4)]
+    views = [DESK.view(DEFAULT, 38, stage) for stage in range(4)]
     for earlier, later in itertools.pairwise(views):
         assert names(earlier) < names(later)
         assert earlier.camera == later.camera
@@ -148,15 +134,15 @@ def test_controls_without_effect_are_hidden():
 
 
 def test_same_parameters_same_bytes():
-    a, b = result(DEFAULT), result(DEFAULT)
+    a, b = (lesson.compute(DEFAULT, no_progress) for _ in range(2))
     assert a.y.tobytes() == b.y.tobytes() and a.many_correlation.tobytes() == b.many_correlation.tobytes()
-    assert result(replace(DEFAULT, seed=7)).y.tobytes() != a.y.tobytes()
+    assert result(DESK.params(seed=7)).y.tobytes() != a.y.tobytes()
 
 
 @pytest.mark.parametrize("treatment", ["plain", "gate", "adaptive"])
 def test_the_corners_of_the_filter_s_beliefs_are_finite(treatment):
     for r_ratio, q_ratio in itertools.product((0.05, 20.0), (0.01, 100.0)):
-        p = replace(DEFAULT, treatment=treatment, r_ratio=r_ratio, q_ratio=q_ratio, sigma_c=0.01, sigma_x_m=1.0,
+        p = DESK.params(treatment=treatment, r_ratio=r_ratio, q_ratio=q_ratio, sigma_c=0.01, sigma_x_m=1.0,
                     gate_percent=50.0, memory=0.5, garbage=(-2000.0, 2000.0))
         r = result(p)
         assert np.isfinite(r.many_nis) and np.isfinite(r.many_correlation).all() and np.isfinite(r.correlation).all()
@@ -164,6 +150,4 @@ def test_the_corners_of_the_filter_s_beliefs_are_finite(treatment):
             v = lesson.view(p, r, Moment(step, UPDATE))
             assert np.isfinite([*v.camera.x, *v.camera.y]).all()
             assert all(x.value is None or isinstance(x.value, str) or np.isfinite(x.value) for x in v.readouts)
-            for figure in v.figures.values():
-                for trace in figure.data:
-                    assert np.isfinite(trace.x).all() and np.isfinite(trace.y).all()
+            check_plots(v)

@@ -1,31 +1,20 @@
 """What the lesson on the Kalman filter claims: the source's numbers, consistency, and what wrong assumptions do."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
-import ziamath
 
 from lessons.filtering import kalman as lesson
-from lessons.kit.lesson import Moment, View, no_progress
-from lessons.kit.params import parameters
+from lessons.kit.lesson import Moment, no_progress
+from tests.lessons.support import Desk, check_formulas, everything, names
 from tests.oracle import entry
 
-DEFAULT = lesson.Params()
+DESK = Desk(lesson)
+DEFAULT, preset, result = DESK.default, DESK.preset, DESK.result
 LAST = 3
 
 
-def preset(name):
-    changes = {k: v for k, v in lesson.LESSON.presets[name].items() if k not in ("step", "stage")}
-    return replace(DEFAULT, **changes)
-
-
-def result(p):
-    return lesson.compute(p, no_progress)
-
-
-def readouts(p, step=30):
-    return {x.name: x.value for x in lesson.view(p, result(p), Moment(step, LAST)).readouts}
+def readouts(p):
+    return DESK.readouts(p, 30)
 
 
 def errors(r, axis=0):
@@ -98,15 +87,15 @@ def test_an_optimistic_start_leaves_its_band_and_recovers():
 
 
 def test_the_ratios_change_the_belief_and_not_the_world():
-    r, other = result(DEFAULT), result(replace(DEFAULT, r_ratio=3.0, q_ratio=0.2, p0_ratio=5.0))
+    r, other = result(DEFAULT), result(DESK.params(r_ratio=3.0, q_ratio=0.2, p0_ratio=5.0))
     np.testing.assert_array_equal(r.truth, other.truth)
     np.testing.assert_array_equal(r.y, other.y)
 
 
 def test_stages_accumulate_and_carry_the_numbers():
     r, k = result(DEFAULT), 30
-    views = [lesson.view(DEFAULT, r, Moment(k, stage)) for stage in range(4)]
-    lasting = [{i.name for i in v.scene} - {"previous", "motion"} for v in views]
+    views = [DESK.view(DEFAULT, k, stage) for stage in range(4)]
+    lasting = [names(v) - {"previous", "motion"} for v in views]
     assert lasting[0] < lasting[1] < lasting[2] < lasting[3]
     for stage, v in enumerate(views):
         assert v.camera == views[0].camera
@@ -126,58 +115,35 @@ def test_stages_accumulate_and_carry_the_numbers():
 
 
 def test_timeline():
-    t = lesson.timeline(replace(DEFAULT, dt_s=0.5))
+    t = lesson.timeline(DESK.params(dt_s=0.5))
     assert (t.steps, t.stages, t.scale, t.unit) == (60, ("predict", "innovation", "gain", "update"), 0.5, "s")
     assert 10 < t.start < 50
 
 
-def all_numbers(v: View):
-    for item in v.scene:
-        for name in ("positions", "points", "start", "end", "gaussian", "position"):
-            if hasattr(item, name):
-                value = getattr(item, name)
-                yield from (value if name == "gaussian" else (value,))
-    for e in v.equations:
-        yield from (x for x in e.pieces if not isinstance(x, str))
-    for x in v.readouts:
-        yield 0.0 if x.value is None or isinstance(x.value, str) else x.value
-    for f in v.figures.values():
-        for trace in f.data:
-            yield from (trace.x, trace.y)
-
-
-@pytest.mark.parametrize("name", list(parameters(lesson.Params)))
-def test_both_ends_of_every_parameter_are_finite(name):
-    spec = parameters(lesson.Params)[name]
-    for value in spec.options or (spec.low, spec.high):
-        p = replace(DEFAULT, **{name: spec.validate(value)})
-        r = result(p)
-        for step in (0, 1, 60):
-            for numbers in all_numbers(lesson.view(p, r, Moment(step, LAST))):
-                assert np.isfinite(np.asarray(numbers, dtype=float)).all()
+@pytest.mark.parametrize("changes", DESK.ends(), ids=str)
+def test_both_ends_of_every_parameter_are_finite(changes):
+    p = DESK.params(**changes)
+    for step in (0, 1, 60):
+        assert np.isfinite(np.frombuffer(everything(lesson.view(p, result(p), Moment(step, LAST))))).all()
 
 
 def test_the_corners_of_the_filter_s_beliefs_are_finite():
     for r_ratio in (0.05, 20.0):
         for q_ratio in (0.01, 100.0):
-            r = result(replace(DEFAULT, r_ratio=r_ratio, q_ratio=q_ratio, sigma_c=0.01, sigma_x_m=200.0, p0_ratio=20.0))
+            r = result(DESK.params(r_ratio=r_ratio, q_ratio=q_ratio, sigma_c=0.01, sigma_x_m=200.0, p0_ratio=20.0))
             assert np.isfinite(r.steady.gain).all()
             assert (r.steady.posterior.cov[[0, 1], [0, 1]] > 0).all()
             assert np.isfinite(r.mean_nees).all()
 
 
 def test_same_parameters_same_bytes():
-    a, b = result(DEFAULT), result(DEFAULT)
+    a, b = (lesson.compute(DEFAULT, no_progress) for _ in range(2))
     assert a.truth.tobytes() == b.truth.tobytes()
     assert a.updates.posterior.mean.tobytes() == b.updates.posterior.mean.tobytes()
     assert a.mean_nees.tobytes() == b.mean_nees.tobytes()
-    assert result(replace(DEFAULT, seed=7)).y.tobytes() != a.y.tobytes()
+    assert result(DESK.params(seed=7)).y.tobytes() != a.y.tobytes()
 
 
 def test_every_formula_can_be_typeset():
-    r = result(DEFAULT)
     for step in (0, 1):
-        for e in lesson.view(DEFAULT, r, Moment(step, LAST)).equations:
-            for piece in e.pieces:
-                if isinstance(piece, str):
-                    assert ziamath.Latex(piece).svg()
+        check_formulas(DESK.view(DEFAULT, step))

@@ -1,32 +1,24 @@
 """What the lesson on MAP and MMSE claims: one bottom, two formulas for it, and the mean of the worlds that fit."""
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
 
 from core.linear_update import map_cost
 from lessons.bayes_kalman import map_and_mmse as lesson
-from lessons.kit.lesson import Moment, no_progress
+from lessons.kit.lesson import no_progress
 from lessons.kit.params import parameters
 from lessons.kit.scene import Surface
+from tests.lessons.support import Desk, check_formulas, check_plots
 from tests.oracle import entry
 
-DEFAULT = lesson.Params()
+DESK = Desk(lesson)
+DEFAULT, preset, result = DESK.default, DESK.preset, DESK.result
 MEAN = 4
 
 
-def preset(name):
-    return replace(DEFAULT, **{k: v for k, v in lesson.LESSON.presets[name].items() if k not in ("step", "stage")})
-
-
 PRESETS = list(lesson.LESSON.presets)
-
-
-@cache
-def result(p):
-    return lesson.compute(p, no_progress)
 
 
 def cost(r, x):
@@ -90,7 +82,7 @@ def test_disagreement_costs_but_does_not_widen_the_posterior():
 
 
 def test_the_mean_square_error_is_least_at_the_minimum():
-    figure = lesson.view(DEFAULT, result(DEFAULT), Moment(40, MEAN)).figures["mmse"]
+    figure = DESK.view(DEFAULT, 40).figures["mmse"]
     theory, worlds = figure.data
     assert abs(theory.x[np.argmin(theory.y)]) < 1e-9
     assert min(theory.y) == pytest.approx(np.trace(result(DEFAULT).info.posterior.cov))
@@ -98,8 +90,7 @@ def test_the_mean_square_error_is_least_at_the_minimum():
 
 
 def test_stages_open_the_derivation():
-    r = result(DEFAULT)
-    views = [lesson.view(DEFAULT, r, Moment(40, stage)) for stage in range(5)]
+    views = [DESK.view(DEFAULT, 40, stage) for stage in range(5)]
     surfaces = [[i.name for i in v.scene if isinstance(i, Surface)] for v in views]
     assert surfaces == [["prior_cost"], ["prior_cost", "measurement_cost"], ["sum_cost"], ["sum_cost"], ["sum_cost"]]
     for v in views:
@@ -112,31 +103,28 @@ def test_stages_open_the_derivation():
 
 def test_the_density_turns_the_bowl_over():
     p = preset("the posterior density")
-    hill = next(i for i in lesson.view(p, result(p), Moment(40, MEAN)).scene if i.name == "sum_cost")
+    hill = DESK.items(p, 40)["sum_cost"]
     at = hill.z.argmax()
     np.testing.assert_allclose((hill.x[at % len(hill.x)], hill.y[at // len(hill.x)]), result(p).info.posterior.mean,
                                atol=1e-9)
 
 
-@pytest.mark.parametrize("name", [n for n, s in parameters(lesson.Params).items() if s.kind != "seed"])
-def test_both_ends_of_every_parameter_are_finite(name):
-    spec = parameters(lesson.Params)[name]
-    ends = [(spec.low, spec.high), (spec.high, spec.high)] if spec.kind == "point" else spec.options or (spec.low,
-                                                                                                         spec.high)
-    for value in ends:
-        p = replace(DEFAULT, **{name: spec.validate(value)})
-        for step, stage in ((0, MEAN), (1, 1), (40, MEAN)):
-            v = lesson.view(p, result(p), Moment(step, stage))
-            for f in v.figures.values():
-                assert all(np.isfinite(t.x).all() and np.isfinite(t.y).all() for t in f.data)
-            for i in v.scene:
-                if isinstance(i, Surface):
-                    assert np.isfinite(i.z).all() and np.ptp(i.x) > 0
-            for e in v.equations:
-                assert all(np.isfinite(x).all() for x in e.pieces if not isinstance(x, str))
+CORNERS = [{name: (q.low, q.high)} for name, q in parameters(lesson.Params).items() if q.kind == "point"]
+
+
+@pytest.mark.parametrize("changes", [e for e in DESK.ends() + CORNERS if "seed" not in e], ids=str)
+def test_both_ends_of_every_parameter_are_finite(changes):
+    p = DESK.params(**changes)
+    for step, stage in ((0, MEAN), (1, 1), (40, MEAN)):
+        v = DESK.view(p, step, stage)
+        check_plots(v)
+        check_formulas(v)
+        for i in v.scene:
+            if isinstance(i, Surface):
+                assert np.isfinite(i.z).all() and np.ptp(i.x) > 0
 
 
 def test_same_parameters_same_bytes():
     a, b = (lesson.compute(DEFAULT, no_progress) for _ in range(2))
     assert a.x.tobytes() == b.x.tobytes() and a.info.posterior.mean.tobytes() == b.info.posterior.mean.tobytes()
-    assert lesson.compute(replace(DEFAULT, seed=2), no_progress).x.tobytes() != a.x.tobytes()
+    assert lesson.compute(DESK.params(seed=2), no_progress).x.tobytes() != a.x.tobytes()

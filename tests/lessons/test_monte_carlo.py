@@ -1,42 +1,19 @@
 """What the lesson on Monte Carlo integration claims: the right variance, the slope, what the proposal does to it."""
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
-import ziamath
 
 from lessons.filtering import _monte_carlo_problems as problems
 from lessons.filtering import monte_carlo as lesson
-from lessons.kit.lesson import Moment, no_progress
-from lessons.kit.params import parameters
+from lessons.kit.lesson import no_progress
+from tests.lessons.support import Desk, check_formulas, check_plots, names
 from tests.oracle import entry
 
-DEFAULT = lesson.Params()
-LAST = 2
-
-
-@cache
-def result(p):
-    return lesson.compute(p, no_progress)
-
-
-@cache
-def typeset(latex):
-    return ziamath.Latex(latex).svg()
-
-
-def preset(name, **changes):
-    return replace(DEFAULT, **{**lesson.LESSON.presets[name], **changes})
-
-
-def shown(p, step=lesson.STEPS, stage=LAST):
-    return lesson.view(p, result(p), Moment(step, stage))
-
-
-def readouts(p):
-    return {x.name: x.value for x in shown(p).readouts}
+DESK = Desk(lesson)
+DEFAULT, preset, result = DESK.default, DESK.preset, DESK.result
+shown, readouts = DESK.view, DESK.readouts
 
 
 def test_example_21_has_the_oracle_s_variance_and_not_the_printed_one():
@@ -60,8 +37,8 @@ def test_a_thousand_repetitions_follow_the_right_normal_law():
     assert within.mean() == pytest.approx(0.954, abs=0.025)
     # The curve with the printed variance is too narrow for this histogram.
     assert (np.abs(r.answers - 1.0) < 2.0 * np.sqrt(expected["text_value"])).mean() < 0.88
-    names = [t.meta["key"] for t in shown(DEFAULT).figures["histogram"].data]
-    assert names == ["answers", "right", "left_out"]
+    traces = [t.meta["key"] for t in shown(DEFAULT).figures["histogram"].data]
+    assert traces == ["answers", "right", "left_out"]
 
 
 @pytest.mark.parametrize("name", ["Example 21", "uniform on [−1, 1]", "exercise 3.13"])
@@ -115,13 +92,12 @@ def test_hardly_any_sample_hits_a_far_corner():
 
 
 def test_stages_accumulate():
-    for p in (replace(DEFAULT, n=1000, repetitions=100), preset("exercise 3.13", n=1000, repetitions=100)):
-        names = [{i.name for i in shown(p, 8, s).scene} for s in range(3)]
-        assert "terms" not in names[0] and "terms" in names[1]
-        assert "mean" not in names[1] and "mean" in names[2]
+    for p in (DESK.params(n=1000, repetitions=100), preset("exercise 3.13", n=1000, repetitions=100)):
+        found = [names(shown(p, 8, s)) for s in range(3)]
+        assert "terms" not in found[0] and "terms" in found[1]
+        assert "mean" not in found[1] and "mean" in found[2]
         assert len({shown(p, s, t).camera for s in (0, 16) for t in range(3)}) == 1
-        for e in shown(p, 8).equations:
-            assert all(typeset(x) if isinstance(x, str) else np.isfinite(x).all() for x in e.pieces)
+        check_formulas(shown(p, 8))
 
 
 @pytest.mark.parametrize("problem", ["parabola", "square"])
@@ -129,25 +105,21 @@ def test_stages_accumulate():
 def test_corners_of_the_parameters_are_finite(problem, proposal):
     for width in (0.3, 5.0):
         for centre in (-2.0, 2.0):
-            p = replace(DEFAULT, problem=problem, proposal=proposal, width=width, centre=centre, n=100,
+            p = DESK.params(problem=problem, proposal=proposal, width=width, centre=centre, n=100,
                         repetitions=100)
             v = shown(p)
             assert all(x.value is None or np.isfinite(x.value) for x in v.readouts)
-            for f in v.figures.values():
-                assert all(np.isfinite(np.asarray(t.y, dtype=float)).all() for t in f.data)
+            check_plots(v)
 
 
-@pytest.mark.parametrize("name", list(parameters(lesson.Params)))
-def test_both_ends_of_every_parameter_are_finite(name):
-    spec = parameters(lesson.Params)[name]
-    ends = [(spec.low,) * 2, (spec.high,) * 2] if spec.kind == "point" else spec.options or (spec.low, spec.high)
-    for end in ends:
-        p = replace(DEFAULT, **{"n": 300, "repetitions": 100, name: spec.validate(end)})
-        assert all(x.value is None or np.isfinite(x.value) for x in shown(p).readouts)
+@pytest.mark.parametrize("changes", DESK.ends(), ids=str)
+def test_both_ends_of_every_parameter_are_finite(changes):
+    p = DESK.params(**{"n": 300, "repetitions": 100, **changes})
+    assert all(x is None or np.isfinite(x) for x in readouts(p).values())
 
 
 def test_same_parameters_same_bytes():
-    p = replace(DEFAULT, n=500, repetitions=100)
+    p = DESK.params(n=500, repetitions=100)
     a, b = (lesson.compute(p, no_progress) for _ in range(2))
     assert a.answers.tobytes() == b.answers.tobytes() and a.running.tobytes() == b.running.tobytes()
     assert lesson.compute(replace(p, seed=3), no_progress).answers.tobytes() != a.answers.tobytes()

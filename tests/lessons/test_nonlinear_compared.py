@@ -1,30 +1,19 @@
 """What the lesson claims: two Kalman filters that choose a line, an exact grid, and which of them is honest."""
 
-from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
 
 from core import metrics
 from lessons.filtering import nonlinear_compared as lesson
-from lessons.kit.lesson import Moment, no_progress
+from lessons.kit.lesson import no_progress
 from lessons.kit.params import parameters
+from tests.lessons.support import Desk, names
 from tests.oracle import entry
 
-DEFAULT = lesson.Params()
+DESK = Desk(lesson)
+DEFAULT, preset, result = DESK.default, DESK.preset, DESK.result
 EKF, UKF, GRID = range(3)
-LAST = 3
-
-
-@cache
-def result(p):
-    return lesson.compute(p, no_progress)
-
-
-def preset(name):
-    changes = {k: v for k, v in lesson.LESSON.presets[name].items() if k not in ("step", "stage")}
-    return replace(DEFAULT, **changes)
 
 
 def area(cov):
@@ -104,7 +93,7 @@ def test_one_station_leaves_a_ring_that_the_ekf_s_ellipse_denies():
 
 
 def test_kappa_moves_the_ukf_and_nothing_else():
-    a, b = result(DEFAULT), result(replace(DEFAULT, kappa=4.0))
+    a, b = result(DEFAULT), result(DESK.params(kappa=4.0))
     np.testing.assert_array_equal(a.ekf.posterior.mean, b.ekf.posterior.mean)
     np.testing.assert_array_equal(a.exact.law.mean, b.exact.law.mean)
     np.testing.assert_array_equal(a.first.sweep, b.first.sweep)
@@ -136,26 +125,26 @@ def test_the_lines_are_what_the_filters_update_with():
 
 
 def test_stages_accumulate_and_carry_the_numbers():
-    r = result(DEFAULT)
-    views = [lesson.view(DEFAULT, r, Moment(1, stage)) for stage in range(4)]
+    views = [DESK.view(DEFAULT, 1, stage) for stage in range(4)]
     assert all(v.camera == views[0].camera for v in views)
     for stage, v in enumerate(views):
         known = [len(e.pieces) > 1 for e in v.equations]
         assert known == sorted(known, reverse=True)
         assert sum(known) == (2, 3, 7, 10)[stage]
         assert any(e.current for e in v.equations)
-    names = [{i.name for i in v.scene} for v in views]
-    assert {"range_1", "range_2"} <= names[1] and {"ekf_lines", "ukf_lines", "sigma"} <= names[2]
-    assert {"ekf_now", "ukf_now", "grid_now"} <= names[3]
+    shown = [names(v) for v in views]
+    assert {"range_1", "range_2"} <= shown[1] and {"ekf_lines", "ukf_lines", "sigma"} <= shown[2]
+    assert {"ekf_now", "ukf_now", "grid_now"} <= shown[3]
 
 
-@pytest.mark.parametrize("name", [n for n, p in parameters(lesson.Params).items() if p.kind in ("float", "int")])
-def test_both_ends_of_every_number_are_finite(name):
-    spec = parameters(lesson.Params)[name]
-    for value in (spec.low, spec.high):
-        r = lesson.compute(replace(DEFAULT, **{name: spec.validate(value)}), no_progress)
-        for numbers in (r.errors, r.nees, r.mean_nees, r.first.sweep, r.first.mean_nees, r.exact.law.cov):
-            assert np.isfinite(numbers).all()
+NUMBERS = {n for n, p in parameters(lesson.Params).items() if p.kind in ("float", "int")}
+
+
+@pytest.mark.parametrize("changes", [e for e in DESK.ends() if NUMBERS.issuperset(e)], ids=str)
+def test_both_ends_of_every_number_are_finite(changes):
+    r = lesson.compute(DESK.params(**changes), no_progress)
+    for numbers in (r.errors, r.nees, r.mean_nees, r.first.sweep, r.first.mean_nees, r.exact.law.cov):
+        assert np.isfinite(numbers).all()
 
 
 def test_same_parameters_same_bytes():

@@ -1,41 +1,19 @@
 """What the lesson on the particle filter claims: EKF and UKF follow the wrong peak, the cloud keeps both."""
 
 import time
-from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
-import ziamath
 
 from lessons.filtering import particle_vs_ekf as lesson
 from lessons.kit.lesson import Cancelled, Moment, no_progress
 from lessons.kit.params import parameters
+from tests.lessons.support import Desk, check_formulas, check_plots, names
 
-DEFAULT = lesson.Params()
+DESK = Desk(lesson)
+DEFAULT, preset, result = DESK.default, DESK.preset, DESK.result
+shown, readouts = DESK.view, DESK.readouts
 LAST = 3
-
-
-@cache
-def result(p):
-    return lesson.compute(p, no_progress)
-
-
-@cache
-def typeset(latex):
-    return ziamath.Latex(latex).svg()
-
-
-def preset(name):
-    return replace(DEFAULT, **lesson.LESSON.presets[name])
-
-
-def shown(p, step=40, stage=LAST):
-    return lesson.view(p, result(p), Moment(step, stage))
-
-
-def readouts(p, step=40):
-    return {x.name: x.value for x in shown(p, step).readouts}
 
 
 def test_at_the_default_ekf_and_ukf_follow_the_wrong_peak_with_confidence():
@@ -53,7 +31,7 @@ def test_at_the_default_ekf_and_ukf_follow_the_wrong_peak_with_confidence():
 
 @pytest.mark.parametrize("n_particles", [20_000, 50_000])
 def test_the_cloud_keeps_both_modes_and_the_truth_lies_in_one(n_particles):
-    r = result(replace(DEFAULT, n_particles=n_particles))
+    r = result(DESK.params(n_particles=n_particles))
     assert 0.1 < r.share[40] < 0.9
     assert (r.share[15:] > 0.1).all() and (r.share[15:] < 0.9).all()
     centres = (r.edges[1:] + r.edges[:-1]) / 2
@@ -82,7 +60,7 @@ def test_without_resampling_the_weights_collapse():
     assert not r.run.resampled.any()
     assert result(DEFAULT).run.n_eff.min() > 1000
     # The particles that carry the weight are drawn although the subsample misses them.
-    cloud = next(i for i in shown(preset("SIS: no resampling")).scene if i.name == "cloud")
+    cloud = DESK.items(preset("SIS: no resampling"))["cloud"]
     assert cloud.weights.sum() > 0.9
     assert cloud.weights.max() > 0.3
     assert "more that each carry over" in shown(preset("SIS: no resampling")).note
@@ -94,7 +72,7 @@ def test_few_particles_lose_a_mode():
 
 
 def test_adaptive_resampling_happens_only_below_the_threshold():
-    p = replace(DEFAULT, sampling="adaptive", threshold=0.3)
+    p = DESK.params(sampling="adaptive", threshold=0.3)
     r = result(p)
     np.testing.assert_array_equal(r.run.resampled, r.run.n_eff < 0.3 * p.n_particles)
     assert 0 < r.run.resampled.sum() < 40
@@ -105,13 +83,13 @@ def test_adaptive_resampling_happens_only_below_the_threshold():
                                     {"resampler": "residual"}, {"proposal": "ekf", "n_particles": 1500},
                                     {"proposal": "ukf", "n_particles": 1500}])
 def test_every_scheme_and_proposal_keeps_both_modes(change):
-    assert 0.1 < result(replace(DEFAULT, **change)).share[40] < 0.9
+    assert 0.1 < result(DESK.params(**change)).share[40] < 0.9
 
 
 def test_the_drawn_particles_are_those_that_the_core_keeps():
     for N in (100, 1999, 2000, 2001, 20_000):
-        np.testing.assert_array_equal(lesson.drawn_index(N), result(replace(DEFAULT, n_particles=N)).run.index)
-    r = result(replace(DEFAULT, n_particles=100))
+        np.testing.assert_array_equal(lesson.drawn_index(N), result(DESK.params(n_particles=N)).run.index)
+    r = result(DESK.params(n_particles=100))
     assert (r.children.sum(axis=1) == 100).all()
     for k in (0, 20, 39):
         np.testing.assert_array_equal(np.bincount(r.run.ancestors[k], minlength=100), r.children[k])
@@ -127,7 +105,7 @@ def test_the_histogram_is_numpy_s():
 
 def test_stages_show_weights_and_ancestors():
     r, k = result(DEFAULT), 20
-    predict, weigh, estimate, resample = ({i.name: i for i in shown(DEFAULT, k, s).scene} for s in range(4))
+    predict, weigh, estimate, resample = (DESK.items(DEFAULT, k, s) for s in range(4))
     assert "paths" in predict and "range_1" not in predict
     assert {"range_1", "range_2"} <= set(weigh)
     drawn = weigh["cloud"].weights
@@ -138,7 +116,7 @@ def test_stages_show_weights_and_ancestors():
     assert len({shown(DEFAULT, s, t).camera for s in (0, 7, 40) for t in range(4)}) == 1
     view = shown(DEFAULT, 40)
     assert view.note == "2,000 of 20,000 particles are drawn."
-    assert {"ekf_0", "ekf_10", "ekf_20", "ekf_30", "ekf_now"} <= {i.name for i in view.scene}
+    assert {"ekf_0", "ekf_10", "ekf_20", "ekf_30", "ekf_now"} <= names(view)
     assert len(view.scene) <= 30
 
 
@@ -155,39 +133,31 @@ def test_the_equations_hold_the_step_s_numbers():
     assert [len(e.pieces) > 1 for e in waiting] == [True] + [False] * (len(waiting) - 1)
 
 
-@pytest.mark.parametrize("name", [n for n in parameters(lesson.Params) if n != "n_particles"])
-def test_both_ends_of_every_parameter_are_finite(name):
-    spec = parameters(lesson.Params)[name]
-    if spec.kind == "point":
-        ends = [(spec.low, spec.low), (spec.high, spec.high), (0.0, 0.0)]
-    else:
-        ends = spec.options or (spec.low, spec.high) if spec.kind != "switch" else (False, True)
-    for end in ends:
-        p = replace(DEFAULT, n_particles=300, **{name: spec.validate(end)})
-        r = lesson.compute(p, no_progress)
-        for step in (0, 1, 40):
-            v = lesson.view(p, r, Moment(step, LAST))
-            for x in v.readouts:
-                assert np.isfinite(x.value)
-            for f in v.figures.values():
-                for trace in f.data:
-                    assert np.isfinite(np.asarray(trace.y, dtype=float)).all()
-            for e in v.equations:
-                for piece in e.pieces:
-                    assert (isinstance(piece, str) and typeset(piece)) or np.isfinite(piece).all()
+AT_THE_ORIGIN = [{name: (0.0, 0.0)} for name, q in parameters(lesson.Params).items() if q.kind == "point"]
+
+
+@pytest.mark.parametrize("changes", [e for e in DESK.ends() + AT_THE_ORIGIN if "n_particles" not in e], ids=str)
+def test_both_ends_of_every_parameter_are_finite(changes):
+    p = DESK.params(n_particles=300, **changes)
+    r = lesson.compute(p, no_progress)
+    for step in (0, 1, 40):
+        v = lesson.view(p, r, Moment(step, LAST))
+        assert all(np.isfinite(x.value) for x in v.readouts)
+        check_plots(v)
+        check_formulas(v)
 
 
 def test_stations_in_one_place_still_have_a_side():
-    r = lesson.compute(replace(DEFAULT, n_particles=300, station_2=DEFAULT.station_1), no_progress)
+    r = lesson.compute(DESK.params(n_particles=300, station_2=DEFAULT.station_1), no_progress)
     assert np.isfinite(r.density).all() and np.isfinite(r.share).all()
 
 
 def test_same_parameters_same_bytes():
-    p = replace(DEFAULT, n_particles=3000)
+    p = DESK.params(n_particles=3000)
     a, b = (lesson.compute(p, no_progress) for _ in range(2))
     assert a.run.particles.tobytes() == b.run.particles.tobytes()
     assert a.density.tobytes() == b.density.tobytes()
-    assert lesson.compute(replace(p, seed=3), no_progress).y.tobytes() != a.y.tobytes()
+    assert lesson.compute(DESK.params(n_particles=3000, seed=3), no_progress).y.tobytes() != a.y.tobytes()
 
 
 def test_a_million_particles_report_each_step_stop_at_once_and_are_fast():

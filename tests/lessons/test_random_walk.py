@@ -1,28 +1,18 @@
 """What the lesson on the stiff and the flexible filter claims: the thesis's numbers, its errata, who wins where."""
 
-from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
 
 from core.random_walk import FLEXIBLE, STIFF
 from lessons.bayes_kalman import random_walk as lesson
-from lessons.kit.lesson import Moment, no_progress
-from lessons.kit.params import parameters
+from lessons.kit.lesson import no_progress
 from lessons.kit.scene import LevelEllipse, Points, Polyline
+from tests.lessons.support import Desk, check_formulas, check_plots
 from tests.oracle import entry
 
-DEFAULT = lesson.Params()
-
-
-def preset(name):
-    return replace(DEFAULT, **{k: v for k, v in lesson.LESSON.presets[name].items() if k not in ("step", "stage")})
-
-
-@cache
-def result(p):
-    return lesson.compute(p, no_progress)
+DESK = Desk(lesson)
+DEFAULT, preset, result = DESK.default, DESK.preset, DESK.result
 
 
 def corrected():
@@ -136,21 +126,21 @@ def test_k10_one_sample_once():
 
 def test_the_note_says_what_does_not_fit():
     def note(p):
-        return lesson.view(p, result(p), Moment(5, 2)).note
+        return DESK.view(p, 5).note
 
     assert "K9" in note(DEFAULT) and "K10" in note(DEFAULT)
     assert note(preset("Table 4.2 as corrected")) == ""
 
 
 def test_both_filters_get_the_same_walk_and_the_belief_does_not_change_it():
-    r, other = result(DEFAULT), result(replace(DEFAULT, R_x_m=5.0, sigma_stiff=0.5, v0_flexible="true"))
+    r, other = result(DEFAULT), result(DESK.params(R_x_m=5.0, sigma_stiff=0.5, v0_flexible="true"))
     np.testing.assert_array_equal(r.y, other.y)
     np.testing.assert_array_equal(r.truth, other.truth)
 
 
 def test_stages_show_the_numbers_one_after_the_other():
-    r, k = result(DEFAULT), 30
-    views = [lesson.view(DEFAULT, r, Moment(k, stage)) for stage in range(3)]
+    k = 30
+    views = [DESK.view(DEFAULT, k, stage) for stage in range(3)]
     for stage, v in enumerate(views):
         assert v.camera == views[0].camera
         running = {"predict": 0, "gain": 1, "update": 2}
@@ -163,38 +153,33 @@ def test_stages_show_the_numbers_one_after_the_other():
     assert isinstance(found["measurements"], Points) and len(found["measurements"].positions) == k
 
 
-def finite(p, r):
-    for k in (0, 1, len(r.stiff.errors)):
-        v = lesson.view(p, r, Moment(k, 2))
+def check_finite(p):
+    for k in (0, 1, len(result(p).stiff.errors)):
+        v = DESK.view(p, k)
         for item in v.scene:
             if isinstance(item, Polyline):
                 assert np.isfinite(item.points).all()
             elif isinstance(item, LevelEllipse):
                 assert np.isfinite(item.gaussian.mean).all() and np.isfinite(item.gaussian.cov).all()
-        for e in v.equations:
-            assert all(np.isfinite(x).all() for x in e.pieces if not isinstance(x, str))
-        for f in v.figures.values():
-            assert all(np.isfinite(t.x).all() and np.isfinite(t.y).all() for t in f.data)
+        check_formulas(v)
+        check_plots(v)
 
 
-@pytest.mark.parametrize("name", [n for n, s in parameters(lesson.Params).items() if s.kind != "seed"])
-def test_both_ends_of_every_parameter_are_finite(name):
-    spec = parameters(lesson.Params)[name]
-    for value in spec.options or ((True, False) if spec.kind == "switch" else (spec.low, spec.high)):
-        p = replace(DEFAULT, **{name: spec.validate(value)})
-        finite(p, result(p))
+@pytest.mark.parametrize("changes", [e for e in DESK.ends() if "seed" not in e], ids=str)
+def test_both_ends_of_every_parameter_are_finite(changes):
+    check_finite(DESK.params(**changes))
 
 
 def test_no_turns_and_no_noise_is_finite():
-    p = replace(DEFAULT, spread_deg=0.0, noise_x_m=0.0, noise_y_m=0.0, world="model", sigma_stiff=0.001)
-    finite(p, result(p))
+    p = DESK.params(spread_deg=0.0, noise_x_m=0.0, noise_y_m=0.0, world="model", sigma_stiff=0.001)
+    check_finite(p)
 
 
 def test_same_parameters_same_bytes():
     a, b = (lesson.compute(DEFAULT, no_progress) for _ in range(2))
     assert a.curve.tobytes() == b.curve.tobytes() and a.y.tobytes() == b.y.tobytes()
     assert a.stiff.steps.posterior.mean.tobytes() == b.stiff.steps.posterior.mean.tobytes()
-    assert lesson.compute(replace(DEFAULT, seed=5), no_progress).y.tobytes() != a.y.tobytes()
+    assert lesson.compute(DESK.params(seed=5), no_progress).y.tobytes() != a.y.tobytes()
 
 
 def test_progress_reaches_the_end_and_can_cancel():

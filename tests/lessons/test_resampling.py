@@ -1,41 +1,18 @@
 """What the lesson on resampling claims: the source's parents, what each scheme guarantees, and the two errata."""
 
 from dataclasses import replace
-from functools import cache
 
 import numpy as np
 import pytest
-import ziamath
 
 from lessons.filtering import resampling as lesson
-from lessons.kit.lesson import Moment, no_progress
-from lessons.kit.params import parameters
+from lessons.kit.lesson import no_progress
+from tests.lessons.support import Desk, check_formulas, check_plots, names
 from tests.oracle import entry
 
-DEFAULT = lesson.Params()
-COPY = 2
-
-
-@cache
-def result(p):
-    return lesson.compute(p, no_progress)
-
-
-@cache
-def typeset(latex):
-    return ziamath.Latex(latex).svg()
-
-
-def preset(name):
-    return replace(DEFAULT, **lesson.LESSON.presets[name])
-
-
-def shown(p, step=None, stage=COPY):
-    return lesson.view(p, result(p), Moment(p.n if step is None else step, stage))
-
-
-def scheme_row(r, name):
-    return lesson.SCHEMES.index(name), r.many
+DESK = Desk(lesson)
+DEFAULT, preset, result = DESK.default, DESK.preset, DESK.result
+shown = DESK.view
 
 
 @pytest.mark.parametrize(("name", "case"), [("Algorithm 6", 0), ("comb at z₁ = 0.02", 1)])
@@ -65,7 +42,7 @@ def test_stratified_points_may_miss_a_particle_with_more_than_a_third_of_the_wei
 
 
 def test_all_schemes_are_unbiased_and_systematic_is_within_one_of_its_share():
-    r = result(replace(DEFAULT, repetitions=5000))
+    r = result(DESK.params(repetitions=5000))
     share = 5 * r.w
     sd = np.sqrt(share * (1 - r.w) / 5000)
     assert (np.abs(r.many.mean - share) < 5 * sd).all()
@@ -75,7 +52,7 @@ def test_all_schemes_are_unbiased_and_systematic_is_within_one_of_its_share():
     # Every other scheme adds less noise to the mean than independent points.
     assert (r.many.mean_sd[[0, 1, 3]] < 0.85 * r.many.mean_sd[2]).all()
     for u in np.linspace(0.01, 1.0, 34).round(2):
-        copies = result(replace(DEFAULT, u=float(u), repetitions=100)).copies
+        copies = result(DESK.params(u=float(u), repetitions=100)).copies
         assert (np.floor(share + 1e-9) <= copies).all() and (copies <= np.ceil(share - 1e-9)).all()
 
 
@@ -86,9 +63,9 @@ def test_copying_in_place_gives_children_of_the_wrong_parent():
     np.testing.assert_array_equal(right.children, right.x[right.ancestors])
     assert (r.children != right.children).any()
     assert "overwritten" in shown(p).note
-    assert "wrong" in {i.name for i in shown(p).scene}
+    assert "wrong" in names(shown(p))
     # The source's own example happens to survive the printed loop.
-    assert (result(replace(DEFAULT, gather="in_place")).children == result(DEFAULT).children).all()
+    assert (result(DESK.params(gather="in_place")).children == result(DEFAULT).children).all()
 
 
 def test_residual_copies_are_the_whole_shares_first():
@@ -100,7 +77,7 @@ def test_residual_copies_are_the_whole_shares_first():
 
 @pytest.mark.parametrize("scheme", lesson.SCHEMES)
 def test_the_points_shown_explain_the_ancestors(scheme):
-    r = result(replace(DEFAULT, scheme=scheme, seed=4))
+    r = result(DESK.params(scheme=scheme, seed=4))
     by_hand = np.searchsorted(r.stairs, r.z)
     np.testing.assert_array_equal(by_hand, r.ancestors[len(r.ancestors) - len(r.z):])
     assert r.copies.sum() == 5
@@ -108,7 +85,7 @@ def test_the_points_shown_explain_the_ancestors(scheme):
 
 @pytest.mark.parametrize("scheme", lesson.SCHEMES)
 def test_stages_accumulate_and_the_camera_stands_still(scheme):
-    p = replace(DEFAULT, scheme=scheme)
+    p = DESK.params(scheme=scheme)
     cameras = set()
     for step in range(6):
         counts = []
@@ -118,37 +95,32 @@ def test_stages_accumulate_and_the_camera_stands_still(scheme):
             counts.append(sum(len(i.positions) for i in v.scene if i.name == "copies"))
             assert len(v.scene) <= 36
             assert sum(e.current for e in v.equations) >= 1
-            for e in v.equations:
-                assert all(typeset(x) if isinstance(x, str) else np.isfinite(x).all() for x in e.pieces)
+            check_formulas(v)
         assert counts == ([0] * 3 if step == 0 else [step - 1, step - 1, step])
     assert len(cameras) == 1
 
 
 def test_particles_are_numbered_from_left_to_right():
-    moved = replace(DEFAULT, p1=(9.5, 1.0))
+    moved = DESK.params(p1=(9.5, 1.0))
     assert (np.diff(result(moved).x) >= 0).all()
     np.testing.assert_allclose(result(moved).w, [0.05, 0.3, 0.2, 0.35, 0.1])
 
 
 def test_no_weight_anywhere_means_equal_weights():
-    r = result(replace(DEFAULT, n=2, p1=(1.0, 0.0), p2=(3.0, 0.0)))
+    r = result(DESK.params(n=2, p1=(1.0, 0.0), p2=(3.0, 0.0)))
     assert r.w.tolist() == [0.5, 0.5]
 
 
-@pytest.mark.parametrize("name", list(parameters(lesson.Params)))
-def test_both_ends_of_every_parameter_are_finite(name):
-    spec = parameters(lesson.Params)[name]
-    ends = [(0.0, 0.0), (10.0, 10.0)] if spec.kind == "point" else spec.options or (spec.low, spec.high)
-    for end in ends:
-        p = replace(replace(DEFAULT, scheme="residual", repetitions=100), **{name: spec.validate(end)})
-        v = shown(p)
-        assert all(np.isfinite(x.value) for x in v.readouts)
-        for f in v.figures.values():
-            assert all(np.isfinite(np.asarray(t.y, dtype=float)).all() for t in f.data)
-        assert len(result(p).ancestors) == p.n
+@pytest.mark.parametrize("changes", DESK.ends(), ids=str)
+def test_both_ends_of_every_parameter_are_finite(changes):
+    p = DESK.params(**{"scheme": "residual", "repetitions": 100, **changes})
+    v = shown(p)
+    assert all(np.isfinite(x.value) for x in v.readouts)
+    check_plots(v)
+    assert len(result(p).ancestors) == p.n
 
 
 def test_same_parameters_same_bytes():
     a, b = (lesson.compute(DEFAULT, no_progress) for _ in range(2))
     assert a.many.variance.tobytes() == b.many.variance.tobytes()
-    assert lesson.compute(replace(DEFAULT, seed=2), no_progress).many.mean.tobytes() != a.many.mean.tobytes()
+    assert lesson.compute(DESK.params(seed=2), no_progress).many.mean.tobytes() != a.many.mean.tobytes()

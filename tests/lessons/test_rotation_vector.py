@@ -1,28 +1,28 @@
 """Rotation vector: MAT Example 12, exercises 1.17 and 1.18, and what full turns do to matrix and quaternion."""
 
-import dataclasses
 from typing import Any
 
 import numpy as np
 import pytest
 
-from lessons.background.rotation_vector import LESSON, Params, Result, compute
+from lessons.background import rotation_vector as lesson
+from lessons.background.rotation_vector import Params, Result
 from lessons.kit.lesson import Moment, View, no_progress
-from lessons.kit.params import parameters
 from lessons.kit.scene import Arrow, Frame, RotationVector
+from tests.lessons.support import Desk, everything
 from tests.oracle import entry
 
+DESK = Desk(lesson)
 END = 60
 
 
 def shown(step: int = END, **changes: Any) -> tuple[Params, Result, View]:
-    p = Params(**changes)
-    r = compute(p, no_progress)
-    return p, r, LESSON.view(p, r, Moment(step))
+    p = DESK.params(**changes)
+    return p, DESK.result(p), DESK.view(p, step)
 
 
 def preset(name: str, step: int = END) -> tuple[Params, Result, View]:
-    return shown(step, **LESSON.presets[name])
+    return shown(step, **lesson.LESSON.presets[name])
 
 
 def numbers(view: View, name: str) -> list[np.ndarray]:
@@ -37,16 +37,6 @@ def readout(view: View, name: str) -> Any:
 
 def item(view: View, name: str) -> Any:
     return next(i for i in view.scene if i.name == name)
-
-
-def everything(view: View) -> bytes:
-    """All numbers that a view holds, as bytes."""
-    found = [np.asarray(getattr(i, f.name), dtype=np.float64).ravel() for i in view.scene
-             for f in dataclasses.fields(i) if isinstance(getattr(i, f.name), (np.ndarray, list, float))]
-    found += [np.asarray(v, dtype=np.float64).ravel() for figure in view.figures.values() for t in figure.data
-              for v in (t.x, t.y)]
-    found += [np.ravel(v) for e in view.equations for v in numbers(view, e.name)]
-    return np.concatenate(found).tobytes()
 
 
 def test_example_12() -> None:
@@ -146,18 +136,12 @@ def test_carried_vector_keeps_its_coordinates_in_the_turned_frame() -> None:
     np.testing.assert_allclose(path[[0, -1]], [p.a, carried.end], atol=1e-12)
 
 
-def ends() -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = [{"axis": (0.0, 0.0, 0.0)}, {"angle_deg": 0.0}]
-    for name, q in parameters(Params).items():
-        values: list[Any] = list(q.options) or ([True] if q.kind == "switch" else [q.low, q.high])
-        found += [{name: (v,) * 3 if q.kind == "point" else v} for v in values]
-    return found
-
-
-@pytest.mark.parametrize("changes", ends(), ids=str)
+@pytest.mark.parametrize("changes", [{"axis": (0.0, 0.0, 0.0)}, {"angle_deg": 0.0}, *DESK.ends()], ids=str)
 def test_finite_and_reproducible_at_the_ends(changes: dict[str, Any]) -> None:
+    p = DESK.params(**changes)
     for step in (0, 31, END):
-        first, second = (everything(shown(step, **changes)[2]) for _ in range(2))
+        first, second = (everything(lesson.LESSON.view(p, lesson.compute(p, no_progress), Moment(step)))
+                         for _ in range(2))
         assert first == second
         assert np.isfinite(np.frombuffer(first)).all()
 
