@@ -86,12 +86,13 @@ def test_help(arguments, capsys):
 
 def test_list(paikka):
     rows = paikka("list").splitlines()
-    assert [row.split()[0] for row in rows] == ["labs.fragile", "labs.quick", "labs.slow", "labs.stubborn"]
-    assert "A quick wave" in rows[1] and "(Test 1)" in rows[1]
+    assert [row.split()[0] for row in rows] == ["labs.fragile", "labs.picked", "labs.quick", "labs.slow",
+                                               "labs.stubborn"]
+    assert "A quick wave" in rows[2] and "(Test 1)" in rows[2]
 
 
 def test_list_as_json(paikka):
-    quick = json.loads(paikka("list", "--json"))[1]
+    quick = json.loads(paikka("list", "--json"))[2]
     assert (quick["id"], quick["title"], quick["chapter"], quick["refs"]) == ("labs.quick", "A quick wave", "labs",
                                                                              ["Test 1"])
     assert quick["steps"] == 6 and quick["stages"] == ["look", "see"]
@@ -102,6 +103,17 @@ def test_list_as_json(paikka):
     assert (amplitude["unit"], amplitude["label"]) == ("m", "Amplitude")
     assert parameters["start"]["default"] == [1.0, 2.0] and parameters["shape"]["options"] == ["round", "square wave"]
     assert quick["presets"] == {"high": {"amplitude": 9.0}, "early look": {"order": 5, "step": 1, "stage": "look"}}
+
+
+def test_a_lesson_that_cannot_be_opened_does_not_hide_the_others(labs, tmp_path, capsys):
+    folder = sample_lessons.write(tmp_path / "labs", "quick")
+    (folder / "broken.py").write_text("import nothing_of_this_name\n", encoding="utf-8")
+    assert main(["list", "--lessons", str(folder)]) == 1
+    out, err = capsys.readouterr()
+    assert "A quick wave" in out and "labs.broken cannot be opened: ModuleNotFoundError" in err
+    good = tmp_path / "any.note"
+    good.write_bytes(b"NOTE 1")
+    assert main(["check", "--lessons", str(sample_lessons.write(folder, "picked")), "--map", str(good)]) == 0
 
 
 def test_our_own_lessons_are_listed(capsys):
