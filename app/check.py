@@ -46,6 +46,7 @@ def check(entry: Entry) -> Iterator[Problem]:
         return
     seen = Seen()
     for name, scenario in cases(entry):
+        is_end = name != "default" and not name.startswith("preset ")
         if isinstance(scenario, ValueError):
             yield Problem(entry.id, f"{name}: {scenario}")
             continue
@@ -57,7 +58,8 @@ def check(entry: Entry) -> Iterator[Problem]:
             continue
         if name == "default" and (spent := time.perf_counter() - started) > 4 * lesson.budget_s:
             yield Problem(entry.id, f"compute took {spent:.1f} s at the default, its budget is {lesson.budget_s:g} s")
-        for k, moment in enumerate(moments(entry, scenario)):
+        seen.stages |= set(lesson.timeline_of(scenario.params).stages)
+        for k, moment in enumerate(ends_of_time(entry, scenario) if is_end else moments(entry, scenario)):
             at = scenarios.with_moment(scenario, entry, *moment)
             try:
                 view = lesson.view(at.params, result, at.moment)
@@ -81,6 +83,7 @@ class Seen:
         self.equations: set[str] = set()
         self.figures: set[str] = set()
         self.latex: set[str] = set()
+        self.stages: set[str] = set()
 
     def add(self, view: View) -> None:
         self.items |= {item.name for item in view.scene}
@@ -127,6 +130,12 @@ def ends(parameter: Parameter) -> list[Any]:
     return [value for value in found if value != parameter.default]
 
 
+def ends_of_time(entry: Entry, scenario: Scenario) -> list[tuple[int, int]]:
+    """The moment shown first, the very first and the very last."""
+    shown, steps = scenario.moment, entry.lesson.timeline_of(scenario.params).steps
+    return sorted({(shown.step, shown.stage), (0, 0), (steps, -1)})
+
+
 def moments(entry: Entry, scenario: Scenario) -> list[tuple[int, int]]:
     """First, second, middle and last step, every stage of the one shown first, and that one."""
     timeline = entry.lesson.timeline_of(scenario.params)
@@ -162,11 +171,10 @@ def word_problems(entry: Entry, words: Words, seen: Seen) -> Iterator[str]:
     if not words.summary:
         yield "the words have no summary"
     yield from (f"the text has no section {name!r}" for name in SECTIONS if name not in words.body)
-    timeline = entry.lesson.timeline_of(entry.lesson.Params())
     needed = {
         "params": set(entry.parameters), "readouts": seen.readouts, "equations": seen.equations,
         "figures": seen.figures, "presets": set(entry.lesson.presets),
-        "stages": set(timeline.stages) if len(timeline.stages) > 1 else set(),
+        "stages": seen.stages - {"all"},
         "groups": {p.group for p in entry.parameters.values() if p.group},
     }
     for section, names in needed.items():

@@ -75,12 +75,21 @@ def _colored(source: str) -> str:
 
 
 def _modules(entry: Entry) -> Iterator[ModuleType]:
-    """The lesson's module and the private siblings that it imports."""
-    yield entry.module
+    """The lesson's module and the private siblings that it imports, and those that these import."""
     package = entry.module.__name__.rpartition(".")[0]
-    for node in ast.walk(_tree(entry.module)):
-        if isinstance(node, ast.ImportFrom) and node.module and node.module.startswith(f"{package}._"):
-            yield importlib.import_module(node.module)
+    waiting, seen = [entry.module], {entry.module.__name__}
+    while waiting:
+        module = waiting.pop(0)
+        yield module
+        for node in ast.walk(_tree(module)):
+            if not isinstance(node, ast.ImportFrom) or not node.module:
+                continue
+            names = [node.module] if node.module.startswith(f"{package}._") else [
+                f"{package}.{alias.name}" for alias in node.names if node.module == package and alias.name[0] == "_"]
+            for name in names:
+                if name not in seen:
+                    seen.add(name)
+                    waiting.append(importlib.import_module(name))
 
 
 def _used(module: ModuleType) -> Iterator[Any]:

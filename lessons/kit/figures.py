@@ -63,7 +63,7 @@ def chart(*traces: Any, cursor: float | None = None, marks: Sequence[float] = ()
     import plotly.graph_objects as go
 
     def axis(log: bool, limits: tuple[float, float] | None) -> dict[str, Any]:
-        found: dict[str, Any] = {"type": "log" if log else "linear"}
+        found: dict[str, Any] = {"type": "log", "exponentformat": "power"} if log else {"type": "linear"}
         if limits is not None:
             found["range"] = [float(np.log10(v)) if log else float(v) for v in limits]
         return found
