@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from core.types import Array
-from lessons.filtering._extended_curves import clipped
+from lessons.kit.curves import clipped
 from lessons.kit.scene import HeatMap, Item, Label, LevelEllipse, Particles, Points, Polyline, Segments
 
 

@@ -6,9 +6,9 @@ import numpy as np
 
 from core.grid import GridDensity
 from core.types import Gaussian
-from lessons.filtering._extended_curves import clipped, level_line, tangent_line
 from lessons.filtering._extended_figures import equations, figures, readouts
 from lessons.filtering._extended_model import PROBABILITY
+from lessons.kit.curves import clipped, level_line, tangent_line
 from lessons.kit.lesson import Moment, View
 from lessons.kit.scene import HeatMap, Item, LevelEllipse, Plane, Points, Polyline, Segments, Stations
 

@@ -41,11 +41,10 @@ def test_oracle_C2_04_both_roots_and_why_the_second_is_rejected():
 
 def test_the_numbers_in_the_formulas_belong_together():
     shown = {e.name: e.pieces for e in DESK.view().equations}
-    A, rest = shown["square"][2], shown["square"][4]
-    p, q = shown["line"][2], shown["line"][4]
+    A, rest, p, q = (shown[name][-1] for name in ("matrix", "right", "p", "q"))
     np.testing.assert_allclose(A @ p, np.ones(4), rtol=1e-9)
     np.testing.assert_allclose(A @ q, rest, rtol=1e-9)
-    a, b, c = shown["quadratic"][2:7:2]
+    a, b, c = (shown[name][-1] for name in ("alpha", "beta", "gamma"))
     D = np.diag([1.0, 1.0, 1.0, -1.0])
     np.testing.assert_allclose([a, b, c], [p @ D @ p, 2 * p @ D @ q - 1, q @ D @ q], rtol=1e-6)
     for i, value in enumerate(shown["lambdas"][2:5:2]):
@@ -166,6 +165,7 @@ def test_stages_accumulate(name):
     for earlier, later in itertools.pairwise([DESK.view(p, 0, stage) for stage in range(5)]):
         assert {i.name for i in earlier.scene} <= {i.name for i in later.scene}
         assert sum(len(e.pieces) for e in earlier.equations) < sum(len(e.pieces) for e in later.equations)
+        assert any(e.current for e in later.equations)
         assert earlier.camera == later.camera
 
 

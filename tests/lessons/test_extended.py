@@ -7,8 +7,8 @@ import pytest
 
 from core.types import Gaussian
 from lessons.filtering import extended as lesson
-from lessons.filtering._extended_curves import clipped, level_line, tangent_line
 from lessons.filtering._extended_model import exact_posterior, sensor_of, share_inside
+from lessons.kit.curves import clipped, level_line, tangent_line
 from lessons.kit.lesson import Moment, no_progress
 from tests.lessons.support import Desk, check_plots, names
 from tests.oracle import entry

@@ -1,4 +1,4 @@
-"""The lines h(x) = value in the plane, curved as they are and straight as the tangent has them."""
+"""Curves in the plane: level lines of sensors, their tangents, and what of a line lies in a box."""
 
 import numpy as np
 
