@@ -48,7 +48,8 @@ def main() -> int:
     if sys.argv[1:]:
         return int(pytest.main(sys.argv[1:]))
     failures = Failures()
-    code = int(pytest.main(["--quiet", "--durations=15"], plugins=[failures]))
+    workers = str(min(os.cpu_count() or 1, 4))
+    code = int(pytest.main(["--quiet", "--durations=15", "-n", workers, "--dist", "loadfile"], plugins=[failures]))
     if code == 1 and all(name.startswith("tests/browser/") for name in failures.ids):
         # drawing by software takes long on a busy machine; a real fault fails again
         print("tests: the browser tests that failed run once more", flush=True)

@@ -7,13 +7,17 @@ import pytest
 
 from lessons.background import normal_distribution as lesson
 from tests.lessons.support import Desk
+from tests.oracle import entry
 
 DESK = Desk(lesson)
 MANY = DESK.params(samples=5000)
 
 
 def test_example_7():
-    r = DESK.result(DESK.default)
+    r, given = DESK.result(DESK.default), entry("C1-15")["expected"]
+    found = DESK.readouts()
+    assert [found["long"], found["short"]] == pytest.approx(given["semi_axes"], abs=1e-3)
+    assert r.level == pytest.approx(given["c"], abs=1e-9)
     np.testing.assert_allclose(r.law.cov, [[16.0, 24.0], [24.0, 52.0]], atol=2e-3)
     np.testing.assert_allclose(np.sqrt(r.values), [8.0, 2.0], atol=1e-3)
     assert r.level == pytest.approx(2.2789, abs=1e-4) and not r.singular
