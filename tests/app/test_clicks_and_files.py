@@ -198,7 +198,7 @@ def test_files_on_the_command_line(lesson_folder, tmp_path, capsys):
     bad.write_bytes(BAD)
     labs = ["--lessons", str(lesson_folder)]
     assert main(["run", "labs.picked", *labs, "--data", str(good)]) == 0
-    assert "12.00 B" in capsys.readouterr().out
+    assert "12 B" in capsys.readouterr().out
     assert main(["run", "labs.picked", *labs, "--data", str(bad)]) == 2
     assert "bad.note: line 1: expected NOTE 1" in capsys.readouterr().err
     assert main(["run", "labs.picked", *labs, "--data", str(tmp_path / "none")]) == 2

@@ -38,6 +38,14 @@ def values_of(p: Parameter) -> st.SearchStrategy[Any]:
             return st.sampled_from(p.options)
         case "point":
             return st.tuples(*[number] * len(p.default))
+        case "points":
+            place = st.floats(p.low, p.high)
+            return st.lists(st.tuples(place, place), max_size=min(p.limit, 5)).map(tuple)
+        case "names":
+            name = st.from_regex(r"[A-Za-z0-9_.\-]{1,8}", fullmatch=True)
+            return st.lists(name, max_size=min(p.limit, 5)).map(tuple)
+        case "file":
+            return st.just("")
         case "int" | "seed":
             return st.integers(int(p.low), int(p.high))
         case _:

@@ -7,7 +7,7 @@ import pytest
 
 from core.indoor import is_open_area
 from core.indoor.geometry import contains
-from lessons.indoor import make_building
+from lessons.indoor import _make_building as make_building
 from lessons.indoor._building import MAP, building, parse
 from lessons.kit import files
 

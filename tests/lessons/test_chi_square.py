@@ -8,6 +8,7 @@ import pytest
 from core.levels import chi_square_probability
 from lessons.background import chi_square as lesson
 from lessons.background._chi_square_view import LAW
+from tests.lessons.finite import assert_finite
 from tests.lessons.support import Desk, typeset
 from tests.oracle import entry
 
@@ -130,9 +131,4 @@ def test_stages_accumulate_and_formulas_typeset(picture):
     {"picture": "form", "mean": (12.0, -12.0), "form": "inverse"},
     {"picture": "form", "spread": "identity", "mean": (12.0, 12.0)}], ids=str)
 def test_extremes_stay_finite(changes):
-    v = desk.view(desk.params(**changes))
-    for item in v.scene:
-        for name in ("positions", "points", "pairs", "vertices"):
-            assert np.isfinite(np.asarray(getattr(item, name, 0.0), dtype=float)).all()
-    for figure in v.figures.values():
-        assert all(np.isfinite(t.y).all() for t in figure.data)
+    assert_finite(desk.view(desk.params(**changes)))

@@ -8,6 +8,7 @@ import pytest
 from core.gaussian import log_density
 from lessons.background import conditioning as lesson
 from lessons.background._conditioning_view import CURVES, HILL, REGRESSION
+from tests.lessons.finite import assert_finite
 from tests.lessons.support import Desk, typeset
 from tests.oracle import entry
 
@@ -93,9 +94,4 @@ def test_stages_accumulate_and_formulas_typeset():
     {"sigma_x_m": 0.5, "gain": 3.0, "sigma_v_m": 0.2, "probe": (0.0, -16.0)}], ids=str)
 def test_extremes_stay_finite(changes):
     for stage in range(REGRESSION + 1):
-        v = desk.view(desk.params(**changes), 0, stage)
-        for item in v.scene:
-            for name in ("positions", "points", "pairs", "segments", "z"):
-                assert np.isfinite(np.asarray(getattr(item, name, 0.0), dtype=float)).all()
-        for figure in v.figures.values():
-            assert all(np.isfinite(t.y).all() for t in figure.data)
+        assert_finite(desk.view(desk.params(**changes), 0, stage))

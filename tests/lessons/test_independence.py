@@ -17,6 +17,7 @@ from lessons.background._independence_model import (
     total_variation,
 )
 from lessons.kit.scene import HeatMap
+from tests.lessons.finite import assert_finite
 from tests.lessons.support import Desk, typeset
 from tests.oracle import entry
 
@@ -143,11 +144,7 @@ def test_stages_accumulate_and_formulas_typeset(picture):
 def test_extremes_stay_finite(changes):
     p = desk.params(**changes)
     v = desk.view(p)
-    for item in v.scene:
-        for name in ("positions", "points", "pairs", "vertices", "values"):
-            assert np.isfinite(np.asarray(getattr(item, name, 0.0), dtype=float)).all()
-    for figure in v.figures.values():
-        assert all(np.isfinite(t.y).all() for t in figure.data)
+    assert_finite(v)
     if changes.get("probe", (0, 0))[1] > 1.4:
         assert "misses" in v.note
     if "b" in changes:

@@ -1,6 +1,6 @@
 """Writes building.json: the building of our own making in which all indoor lessons play.
 
-    python -m lessons.indoor.make_building
+    python -m lessons.indoor._make_building
 
 Two floors of 108 m x 46 m: on each a rectangular loop of corridors with rooms along it; on floor 0 an L-shaped lobby
 and a cafeteria inside the loop and a yard outside; on floor 1 an auditorium and a library.  Two stairs and a lift.
