@@ -36,8 +36,6 @@ CHAPTERS: dict[str, tuple[str, ...]] = {
     "bayes_kalman": ("bayes_theorem", "map_and_mmse", "gain", "random_walk"),
     "indoor": ("floor_graph", "link_choice", "signal_strength", "graph_filter", "convergence"),
 }
-CHAPTERS = {chapter: tuple(n for n in names if (Path(__file__).parent / chapter / f"{n}.py").exists())  # WIP
-            for chapter, names in CHAPTERS.items()}
 
 CHAPTER_NAMES: dict[str, dict[str, str]] = {
     "en": {

@@ -97,7 +97,7 @@ def test_tiny_heights_above_the_equator_plane_keep_their_accuracy():
 def test_sphere_has_the_textbook_answers():
     ball = fr.Ellipsoid(6371000.0, 0.0)
     r = np.array([[1e6, 2e6, 3e6], [0.0, 0.0, 0.0], [-5e6, 1.0, -5e6]])
-    lat, lon, h = fr.geodetic_from_ecef(r, ball)
+    lat, _, h = fr.geodetic_from_ecef(r, ball)
     radius = np.linalg.norm(r, axis=-1)
     np.testing.assert_allclose(h, radius - 6371000.0, rtol=0, atol=5e-9)
     np.testing.assert_allclose(np.sin(lat[[0, 2]]), r[[0, 2], 2] / radius[[0, 2]], rtol=0, atol=2e-16)
