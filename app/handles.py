@@ -67,9 +67,14 @@ class Handles:
             for k, point in enumerate(points):
                 key = f"{name}.{k}" if parameter.kind == "points" else name
                 shown.add(key)
-                self._show(key, k, parameter, space.display(in_space(point, style)), style)
+                at = np.add(point, self._base(parameter))
+                self._show(key, k, parameter, space.display(in_space(at, style)), style)
         for key in set(self._balls) - shown:
             self._discard(key)
+
+    def _base(self, parameter: Parameter) -> Any:
+        """What the parameter's point is an offset from."""
+        return self._current[parameter.about] if parameter.about else 0.0
 
     def _show(self, key: str, k: int, parameter: Parameter, at: Array, style: Style) -> None:
         x, y, z = (float(v) for v in at)
@@ -116,7 +121,8 @@ class Handles:
             if found is None:
                 return
             n = len(parameter.default) if parameter.kind == "point" else 2  # type: ignore[arg-type]
-            point = tuple(round(float(v), digits) + 0.0 for v in found[:n])  # no minus zero
+            offset = found[:n] - self._base(parameter)
+            point = tuple(round(float(v), digits) + 0.0 for v in offset)  # no minus zero
             if parameter.kind == "point":
                 self._change({parameter.name: parameter.nearest(point)})
             elif k < len(points := self._current[parameter.name]):

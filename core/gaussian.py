@@ -55,7 +55,8 @@ class Product(NamedTuple):
 
 
 def sample(
-    g: Gaussian, size: int | tuple[int, ...], rng: "np.random.Generator", *, root: Callable[[Array], Array] = cholesky_psd
+    g: Gaussian, size: int | tuple[int, ...], rng: "np.random.Generator", *,
+    root: Callable[[Array], Array] = cholesky_psd,
 ) -> Array:
     """x = mu + C u  with u ~ N(0, I) and C C' = P.
 

@@ -119,10 +119,7 @@ def correct(
     C = shared(H)
     HP = times(C, P)
     S = times(HP, C.mT) + R                               # MAT exercise 3.1
-    if missing is None:
-        K = solve_spd(S, HP).mT                           # (3.12)
-    else:
-        K = solve_spd(*without(missing, S, HP)).mT
+    K = solve_spd(*((S, HP) if missing is None else without(missing, S, HP))).mT       # (3.12)
     dot = np.ndarray.dot if K.ndim == 2 else times
     B = P - dot(K, HP)                                    # (I - K H) P
     # B + (K R - B H') K' is (3.10), (I - K H) P (I - K H)' + K R K' for any K, with two products less.

@@ -168,17 +168,18 @@ def cholesky(P: Array) -> Array | None:
             return None
     L = zero_stack(P.shape[:-2], n, n)
     for j in range(n):
-        for i in range(j, n):
+        d = P[..., j, j]
+        for k in range(j):
+            d = d - L[..., j, k] * L[..., j, k]
+        if not (d > 0).all():
+            return None
+        L[..., j, j] = np.sqrt(d)
+        reciprocal = 1 / L[..., j, j]
+        for i in range(j + 1, n):
             s = P[..., i, j]
             for k in range(j):
                 s = s - L[..., i, k] * L[..., j, k]
-            if i > j:
-                L[..., i, j] = s * reciprocal
-            elif (s > 0).all():
-                L[..., j, j] = np.sqrt(s)
-                reciprocal = 1 / L[..., j, j]
-            else:
-                return None
+            L[..., i, j] = s * reciprocal
     return L
 
 

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from core.levels import chi_square_probability
 from lessons.kit.equations import Equation
 from lessons.kit.figures import bars, chart, line
 from lessons.kit.lesson import Readout
@@ -34,14 +35,14 @@ def _form(p: "Params", r: "Result") -> "go.Figure":
 
 def _share(p: "Params", r: "Result") -> "go.Figure":
     """How many samples an ellipse of probability P holds, for every P."""
-    if r.singular:
-        distance = np.zeros(len(r.x))
-    else:
-        distance = np.sort(np.square(np.linalg.solve(np.linalg.cholesky(r.law.cov), (r.x - r.law.mean).T)).sum(axis=0))
-    probability = 1.0 - np.exp(-0.5 * distance)                 # chi-square with two degrees of freedom
+    claimed = line("claimed", [0.0, 100.0], [0.0, 100.0], "posterior", dash=True)
+    if not r.rank:
+        return chart(claimed, cursor=100 * p.probability)
+    distance = np.sort(r.distance)
+    probability = chi_square_probability(distance, r.rank)
     held = (np.arange(len(distance)) + 1.0) / len(distance)
     some = np.unique(np.round(np.linspace(0, len(distance) - 1, 200)).astype(int))
-    return chart(line("claimed", [0.0, 100.0], [0.0, 100.0], "posterior", dash=True),
+    return chart(claimed,
                  line("held", 100 * probability[some], 100 * held[some], "measurement"), cursor=100 * p.probability)
 
 

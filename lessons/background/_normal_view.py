@@ -14,7 +14,7 @@ from lessons.kit.scene import Arrow, Camera, Item, LevelEllipse, Orbit, Plane, P
 if TYPE_CHECKING:
     from lessons.background.normal_distribution import Params, Result
 
-CELLS = 61
+CELLS, MOST = 61, 161         # of the surface's grid: at the least, and for a thin one
 HILL = 0.55                  # height of the surface, as a share of the picture's half width
 LINE = 0.5                   # longest bar of the histogram, likewise
 
@@ -24,13 +24,20 @@ def view(p: "Params", r: "Result", at: Moment) -> View:
     scene, camera = _surface(r) if p.show == "surface" else _plane(p, r, half)
     note = "Singular: no density in the plane, all mass lies on a line (or in a point)." if r.singular else ""
     return View(scene=scene, camera=camera, figures=figures(p, r), readouts=readouts(p, r), equations=equations(p, r),
-                caption=f"the ellipse that holds {100 * p.probability:.3g} %", note=note)
+                caption=_caption(p, r), note=note)
+
+
+def _caption(p: "Params", r: "Result") -> str:
+    if p.show == "form":
+        return f"a'x has mean {r.form_mean:.3g} m and σ {r.form_sd:.3g} m"
+    held = ("the point", "the part of the line", "the ellipse")[r.rank]
+    return f"{held} that holds {100 * p.probability if r.rank else 100:.3g} %"
 
 
 def _half(r: "Result") -> float:
     """Half the picture's width: 12 as in the source where that is enough."""
     reach = float(np.abs(r.law.mean).max()) + 2.6 * float(np.sqrt(max(r.values.max(), 0.0)))
-    return 12.0 if reach < 3.0 else max(12.0, 1.02 * reach)
+    return max(12.0, 1.02 * reach)
 
 
 def _plane(p: "Params", r: "Result", half: float) -> tuple[list[Item], Camera]:
@@ -50,6 +57,10 @@ def _plane(p: "Params", r: "Result", half: float) -> tuple[list[Item], Camera]:
                       Segments("pairs", np.stack([r.x[shown], r.other[shown]], axis=1), role="muted", width=1.2)]
     if not r.singular:
         items.append(LevelEllipse("level", r.law, role="posterior", probability=p.probability, width=4.0, cross=False))
+    elif r.rank:
+        reach = np.sqrt(r.level * r.values[0]) * r.vectors[:, 0]
+        ends = np.array([[r.law.mean - reach, r.law.mean + reach]])
+        items.append(Segments("part", ends, role="posterior", width=7.0))
     items += _axes(r)
     if p.show == "form":
         items += _form(p, r, half)
@@ -94,7 +105,8 @@ def _form(p: "Params", r: "Result", half: float) -> list[Item]:
 
 def _surface(r: "Result") -> tuple[list[Item], Camera]:
     half = 3.0 * max(float(np.sqrt(max(r.values.max(), 0.0))), 1.0)
-    x = np.linspace(-half, half, CELLS)
+    thin = float(np.sqrt(max(r.values.min(), 0.0)))
+    x = np.linspace(-half, half, int(np.clip(4.0 * half / max(thin, 1e-9), CELLS, MOST)))
     items: list[Item] = [Segments("ground", r.law.mean + _frame(half), role="muted", width=1.5)]
     if not r.singular:
         xx, yy = np.meshgrid(x + r.law.mean[0], x + r.law.mean[1])

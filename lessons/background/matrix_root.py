@@ -26,7 +26,7 @@ class Params:
     a_12: float = slider(-4.0, low=-60.0, high=60.0, step=0.5, group="matrix")
     of_root: str = choice("matrix", ("matrix", "root"), group="matrix")
     other: str = choice("cholesky", ROOTS[1:], group="roots")
-    turn_deg: float = slider(40.0, low=-180.0, high=180.0, step=5.0, unit="°", group="roots")
+    turn_deg: float = slider(40.0, low=-180.0, high=180.0, step=0.5, unit="°", group="roots")
     arrow_deg: float = slider(30.0, low=0.0, high=360.0, step=5.0, unit="°", group="view")
     b_11: float = slider(0.6, low=-2.0, high=2.0, step=0.1, group="involution")
     b_12: float = slider(0.8, low=-2.0, high=2.0, step=0.1, group="involution")

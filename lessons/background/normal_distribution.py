@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from core.forms import half_space_probability
-from core.gaussian import chi_square_level, mahalanobis_squared, sample
+from core.gaussian import chi_square_level, sample
 from core.linalg import cholesky_psd, schur, sqrt_psd
 from core.types import Array, Gaussian
 from lessons.background._normal_view import view
@@ -26,7 +26,7 @@ class Params:
 
     show: str = choice("ellipse", ("ellipse", "surface", "form"))
     mean: Point = draggable((0.0, 0.0), low=-12.0, high=12.0, role="prior", group="law")
-    axis: Point = draggable(EXAMPLE_7["axis"], low=-30.0, high=30.0, role="vector", group="law")
+    axis: Point = draggable(EXAMPLE_7["axis"], low=-30.0, high=30.0, role="vector", group="law", about="mean")
     ratio: float = slider(0.25, low=0.0, high=1.0, step=0.01, group="law")
     probability: float = slider(0.68, low=0.01, high=0.999, step=0.001, group="law")
     samples: int = slider(100, low=10, high=5000, log=True, group="samples")
@@ -38,7 +38,10 @@ class Params:
 
 
 class Result(NamedTuple):
-    """The law; its eigenvalues (2,), falling, and eigenvectors (2, 2) in columns; level: the chi-square of the ellipse.
+    """The law; its eigenvalues (2,), falling, and eigenvectors (2, 2) in columns; rank: how many are not zero.
+
+    level: the chi-square of the ellipse, with `rank` degrees of freedom; distance (N,): the samples' squared
+    Mahalanobis distances in the line or plane of the law.
 
     x (N, 2): samples mean + root u with the chosen root, other: with the other one and the same u; inside (N,).  Along
     a: mean and standard deviation of a'x, P(a'x <= limit), and the share of the samples there.
@@ -47,16 +50,21 @@ class Result(NamedTuple):
     law: Gaussian
     values: Array
     vectors: Array
+    rank: int
     level: float
     x: Array
     other: Array
+    distance: Array
     inside: Array
     a: Array
     form_mean: float
     form_sd: float
     form_probability: float
     form_share: float
-    singular: bool
+
+    @property
+    def singular(self) -> bool:
+        return self.rank < 2
 
 
 def compute(p: Params, progress: Progress) -> Result:
@@ -68,16 +76,19 @@ def compute(p: Params, progress: Progress) -> Result:
     u = sample(standard, p.samples, np.random.default_rng(p.seed))
     roots = {"cholesky": cholesky_psd(cov), "symmetric": sqrt_psd(cov)}
     x, other = (law.mean + np.matvec(roots[name], u) for name in sorted(roots, key=lambda name: name != p.root))
-    level = float(chi_square_level(p.probability, 2))
-    singular = spectrum.values.min() <= FLAT * max(spectrum.values.max(), 1e-12)
-    inside = (np.square(u).sum(axis=1) if singular else mahalanobis_squared(law, x)) <= level
+    rank = int((spectrum.values > FLAT * max(spectrum.values.max(), 1e-12)).sum())
+    level = float(chi_square_level(p.probability, rank)) if rank else 0.0
+    along = (x - law.mean) @ spectrum.Q[:, :rank]
+    distance = (along**2 / spectrum.values[:rank]).sum(axis=1)
+    inside = distance <= level
     angle = np.deg2rad(p.direction_deg)
     a = np.array([np.cos(angle), np.sin(angle)])
-    sd = float(np.sqrt(max(a @ cov @ a, 0.0)))
+    variance = float(a @ cov @ a)
+    sd = np.sqrt(variance) if variance > 1e-12 * spectrum.values.max() else 0.0         # else constant
     mean = float(a @ law.mean)
-    below = float(half_space_probability(law, a, p.limit)) if sd > 0.0 else float(mean <= p.limit)
-    return Result(law, spectrum.values, spectrum.Q, level, x, other, inside, a, mean, sd, below,
-                  float((x @ a <= p.limit).mean()), bool(singular))
+    below = float(half_space_probability(law, a, p.limit)) if sd > 0.0 else float(mean <= p.limit + 1e-9)
+    return Result(law, spectrum.values, spectrum.Q, rank, level, x, other, distance, inside, a, mean, sd, below,
+                  float((x @ a <= p.limit + 1e-9).mean()))
 
 
 def covariance(p: Params) -> Array:
@@ -107,6 +118,6 @@ LESSON = Lesson(
         "every linear form is normal": {"show": "form", "samples": 1000},
         "exercise 1.11": {**EXERCISE_1_11, "samples": 1000},
         "the singular limit": {"ratio": 0.0},
-        "the singular limit as a surface": {"show": "surface", "ratio": 0.05},
+        "the singular limit as a surface": {"show": "surface", "ratio": 0.1},
     },
 )

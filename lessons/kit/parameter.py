@@ -50,6 +50,7 @@ class Parameter:
     group: str = ""
     limit: int = 0
     click: bool = False
+    about: str = ""
     file: FileKind | None = None
 
     def validate(self, value: object) -> Value:

@@ -32,14 +32,15 @@ def switch(default: bool, *, group: str = "") -> Any:
 
 def draggable(default: Sequence[float], *, low: float = -1000.0, high: float = 1000.0, unit: str = "m",
               plane: Literal["xy", "sphere", "free"] = "xy", role: str = "handle", group: str = "",
-              click: bool = False) -> Any:
+              click: bool = False, about: str = "") -> Any:
     """A point of 2 or 3 coordinates with a handle in the scene, and number fields.
 
     plane: "xy" drags in the horizontal plane through the point, "sphere" keeps the distance from the origin (a
     direction), "free" drags in the plane parallel to the picture.  click: a click into the scene moves it there.
+    about: the point parameter that this one is an offset from; its handle stands at their sum.
     """
     return _field("point", tuple(float(v) for v in default), low=low, high=high, unit=unit, plane=plane, role=role,
-                  group=group, click=click)
+                  group=group, click=click, about=about)
 
 
 def points(default: Sequence[Sequence[float]] = (), *, limit: int = 24, low: float = -1000.0, high: float = 1000.0,

@@ -142,6 +142,7 @@ class Params:
     route: Names = names((), limit=3)
     fixes: Points = points(((10.0, 10.0),), limit=3, low=-50.0, high=50.0)
     start: Point = draggable((0.0, 20.0), low=-50.0, high=50.0, click=True)
+    tip: Point = draggable((10.0, 0.0), low=-50.0, high=50.0, about="start")
     note: str = datafile(NOTE)
     hidden: bool = switch(False)
 
@@ -160,7 +161,8 @@ PICKED_WORDS = '''---
 title: Picked
 summary: For tests.
 params: {route: {label: Route, hint: Clicks.}, fixes: {label: Fixes, hint: Clicks.},
-  start: {label: Start, hint: Click.}, note: {label: Note, hint: File.}, hidden: {label: Hidden, hint: No list.}}
+  start: {label: Start, hint: Click.}, tip: {label: Tip, hint: From start.},
+  note: {label: Note, hint: File.}, hidden: {label: Hidden, hint: No list.}}
 readouts: {bytes: Size}
 ---
 # Idea

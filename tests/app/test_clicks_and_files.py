@@ -62,6 +62,19 @@ def test_without_the_list_a_click_moves_the_point_that_follows_clicks(picked):
     assert "/handle.fixes.0" not in picked.browser.nodes
 
 
+def test_an_offset_has_its_handle_at_the_sum_and_follows_what_it_is_about(picked):
+    assert picked.browser.nodes["/handle.tip"]["position"][:2] == pytest.approx(at(10.0, 20.0)[:2], abs=0.03)
+    picked.browser.drag("/handle.tip", at(15.0, 30.0))
+    until(lambda: picked.session.scenario.params.tip == pytest.approx((15.0, 10.0), abs=0.3))
+    picked.settle()
+    tip = picked.session.scenario.params.tip
+    picked.browser.drag("/handle.start", at(-20.0, 0.0))
+    until(lambda: picked.session.scenario.params.start == pytest.approx((-20.0, 0.0), abs=0.3))
+    picked.settle()
+    assert picked.session.scenario.params.tip == tip
+    assert picked.browser.nodes["/handle.tip"]["position"][:2] == pytest.approx(at(-5.0, 10.0)[:2], abs=0.06)
+
+
 @pytest.mark.parametrize("ray", [([0.0, 0.0, 5.0], [0.0, 0.0, 0.0]), ([0.0, 0.0, float("nan")], [0.0, 0.0, -1.0]),
                                  ([0.0, 0.0, 5.0], [0.0, 0.0, 1.0]), ([1.0], [0.0, 1.0])])
 def test_a_ray_that_leads_nowhere_does_nothing(picked, ray):

@@ -47,7 +47,8 @@ def test_the_default_is_uncorrelated_and_dependent():
 
 
 @pytest.mark.parametrize("law", [disc(), square(0.0), square(0.5), square(np.pi / 4), square(np.pi / 2),
-                                 law_of(desk.preset("normal, ρ = 0.83"))], ids=str)
+                                 law_of(desk.preset("normal, ρ = 0.83"))],
+                         ids=["disc", "square 0", "square 0.5", "square 45°", "square 90°", "normal"])
 def test_the_facts_agree_with_a_large_sample(law):
     """Within 4.5 standard errors of 40,000 draws: at most 0.025 for a correlation."""
     x = law.draw(40_000, np.random.default_rng(3))

@@ -70,8 +70,18 @@ def test_the_singular_limit_has_no_density_but_linear_forms():
     assert np.abs((r.x - r.law.mean) @ across).max() < 1e-6
     along = DESK.result(replace(p, show="form", direction_deg=63.43))
     assert along.form_sd == pytest.approx(8.0, abs=0.01)
+    share, noise = DESK.readouts(replace(p, samples=5000))["inside"], 100 * np.sqrt(0.68 * 0.32 / 5000)
+    assert share == pytest.approx(68.0, abs=4.5 * noise)                # of the part of the line, chi-square n = 1
+    assert DESK.readouts(p)["long"] == pytest.approx(8.0 * 0.99446, rel=1e-3)
     point = DESK.result(DESK.params(axis=(0.0, 0.0)))
     assert point.singular and point.form_sd == 0.0 and point.form_probability == 1.0
+
+
+def test_a_constant_form_is_certain_in_spite_of_rounding():
+    p = DESK.params(show="form", axis=(8.0, 0.0), ratio=0.0, direction_deg=90.0)
+    r = DESK.result(p)
+    assert (r.form_sd, r.form_probability, r.form_share) == (0.0, 1.0, 1.0)
+    assert DESK.result(replace(p, limit=-0.5)).form_probability == 0.0
 
 
 def test_the_surface_and_its_ring():
