@@ -29,7 +29,7 @@ def view(p: "Params", r: "Result", at: Moment) -> View:
 
 def _caption(p: "Params", r: "Result") -> str:
     if p.show == "form":
-        return f"a'x has mean {r.form_mean:.3g} m and σ {r.form_sd:.3g} m"
+        return f"a'x has mean {round(r.form_mean, 6) + 0.0:.3g} m and σ {r.form_sd:.3g} m"
     held = ("the point", "the part of the line", "the ellipse")[r.rank]
     return f"{held} that holds {100 * p.probability if r.rank else 100:.3g} %"
 
@@ -47,6 +47,10 @@ def _plane(p: "Params", r: "Result", half: float) -> tuple[list[Item], Camera]:
         return (np.abs(x) <= box).all(axis=1)
 
     items: list[Item] = []
+    if r.rank == 1:
+        reach = np.sqrt(r.level * r.values[0]) * r.vectors[:, 0]
+        ends = np.array([[r.law.mean - reach, r.law.mean + reach]])
+        items.append(Segments("part", ends, role="posterior", width=16.0))
     for name, chosen, role in (("outside", ~r.inside, "monte_carlo"), ("inside", r.inside, "measurement")):
         if (chosen & visible(r.x)).any():
             items.append(Points(name, r.x[chosen & visible(r.x)], role=role, size=6.5))
@@ -57,10 +61,6 @@ def _plane(p: "Params", r: "Result", half: float) -> tuple[list[Item], Camera]:
                       Segments("pairs", np.stack([r.x[shown], r.other[shown]], axis=1), role="muted", width=1.2)]
     if not r.singular:
         items.append(LevelEllipse("level", r.law, role="posterior", probability=p.probability, width=4.0, cross=False))
-    elif r.rank:
-        reach = np.sqrt(r.level * r.values[0]) * r.vectors[:, 0]
-        ends = np.array([[r.law.mean - reach, r.law.mean + reach]])
-        items.append(Segments("part", ends, role="posterior", width=7.0))
     items += _axes(r)
     if p.show == "form":
         items += _form(p, r, half)
