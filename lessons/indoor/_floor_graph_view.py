@@ -5,7 +5,17 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from core.types import Array
-from lessons.indoor._floors import areas, floor_camera, graph_items, height, house_camera, link_pairs, outline, walls
+from lessons.indoor._floors import (
+    areas,
+    floor_camera,
+    floor_labels,
+    graph_items,
+    height,
+    house_camera,
+    link_pairs,
+    outline,
+    walls,
+)
 from lessons.kit.figures import chart, line
 from lessons.kit.lesson import Moment, Readout, Target, View
 from lessons.kit.scene import Item, Label, Points, Polygon, Polyline, Segments, Walls
@@ -32,16 +42,9 @@ def _building(p: "Params", r: "Result") -> View:
     scene += [Label(f"name_{o}", o.replace("_", " "),
                     (*a.polygon.mean(axis=0), float(height(g, a.floor, p.lift_m)) + 1.0))
               for o, a in g.areas.items()]
-    scene += _floor_labels(p, r)
+    scene += floor_labels(r.building.graph, p.lift_m)
     return View(scene=scene, camera=house_camera(r.building, p.lift_m), figures={"lengths": _lengths(r)},
                 readouts=_counts(r), caption=r.building.name)
-
-
-def _floor_labels(p: "Params", r: "Result") -> list[Item]:
-    g = r.building.graph
-    x = min(n.x_m for n in g.nodes.values()) - 8.0
-    y = max(n.y_m for n in g.nodes.values())
-    return [Label(f"floor_{f}", f"floor {f}", (x, y, float(height(g, f, p.lift_m))), 1.1) for f in g.floors]
 
 
 def _counts(r: "Result") -> list[Readout]:

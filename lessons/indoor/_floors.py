@@ -7,7 +7,7 @@ import numpy as np
 from core.indoor import FloorGraph
 from core.types import Array
 from lessons.indoor._building import Building
-from lessons.kit.scene import Item, Orbit, Plane, Points, Polygon, Segments, Walls
+from lessons.kit.scene import Item, Label, Orbit, Plane, Points, Polygon, Segments, Walls
 
 WALL_M = 2.2
 
@@ -99,6 +99,13 @@ def corners(b: Building, floors: Sequence[int]) -> Array:
              *(b.walls[f].reshape(-1, 2) for f in floors if f in b.walls)]
     points = np.concatenate(parts)
     return np.array([points.min(axis=0), points.max(axis=0)])
+
+
+def floor_labels(g: FloorGraph, lift_m: float) -> list[Item]:
+    """The number of each floor beside its north-west corner."""
+    x = min(n.x_m for n in g.nodes.values()) - 8.0
+    y = max(n.y_m for n in g.nodes.values())
+    return [Label(f"floor_{f}", f"floor {f}", (x, y, float(height(g, f, lift_m))), 1.1) for f in g.floors]
 
 
 def house_camera(b: Building, lift_m: float = 0.0, floors: Sequence[int] | None = None, elevation_deg: float = 42.0,

@@ -9,6 +9,7 @@ from core.types import Array
 from lessons.indoor._floors import (
     areas,
     corners,
+    floor_labels,
     floor_objects,
     graph_items,
     house_camera,
@@ -38,7 +39,8 @@ class House:
 
     def background(self) -> list[Item]:
         g = self.g
-        return [*areas(g, g.floors, LIFT_M, opacity=0.2), *graph_items(g, g.floors, LIFT_M, width=1.8, nodes=False)]
+        return [*areas(g, g.floors, LIFT_M, opacity=0.2), *graph_items(g, g.floors, LIFT_M, width=1.8, nodes=False),
+                *floor_labels(g, LIFT_M)]
 
     def camera(self) -> Camera:
         return house_camera(self.r.building, LIFT_M)
