@@ -102,9 +102,9 @@ def corners(b: Building, floors: Sequence[int]) -> Array:
 
 
 def floor_labels(g: FloorGraph, lift_m: float) -> list[Item]:
-    """The number of each floor beside its north-west corner."""
-    x = min(n.x_m for n in g.nodes.values()) - 8.0
-    y = max(n.y_m for n in g.nodes.values())
+    """The number of each floor beside its north-east corner, which no floor hides from `house_camera`."""
+    x = max(n.x_m for n in g.nodes.values())
+    y = max(n.y_m for n in g.nodes.values()) + 8.0
     return [Label(f"floor_{f}", f"floor {f}", (x, y, float(height(g, f, lift_m))), 1.1) for f in g.floors]
 
 
