@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from core.indoor.geometry import contains
 from core.types import Array
 from lessons.indoor._floors import (
     areas,
@@ -40,11 +41,24 @@ def _building(p: "Params", r: "Result") -> View:
     if p.walls:
         scene += walls(r.building, g.floors, p.lift_m)
     scene += [Label(f"name_{o}", o.replace("_", " "),
-                    (*a.polygon.mean(axis=0), float(height(g, a.floor, p.lift_m)) + 1.0))
+                    (*_name_place(a.polygon), float(height(g, a.floor, p.lift_m)) + 1.0))
               for o, a in g.areas.items()]
     scene += floor_labels(r.building.graph, p.lift_m)
     return View(scene=scene, camera=house_camera(r.building, p.lift_m), figures={"lengths": _lengths(r)},
                 readouts=_counts(r), caption=r.building.name)
+
+
+def _name_place(polygon: Array) -> Array:
+    """The mean of the corners; where that lies outside, the middle of the longest diagonal that stays inside."""
+    middle = polygon.mean(axis=0)
+    if contains(polygon, middle):
+        return middle
+    i, j = np.triu_indices(len(polygon), 2)
+    a, b = polygon[i], polygon[j]
+    shares = np.linspace(0.05, 0.95, 19)[:, None, None]
+    inside = contains(polygon, ((1 - shares) * a + shares * b).reshape(-1, 2)).reshape(19, -1).all(axis=0)
+    length = np.where(inside, np.linalg.norm(b - a, axis=1), 0.0)
+    return 0.5 * (a + b)[length.argmax()]
 
 
 def _counts(r: "Result") -> list[Readout]:
