@@ -8,7 +8,7 @@ import numpy as np
 from app.controls import Change
 from app.draw.primitives import Style
 from app.draw.space import Space
-from app.handles import digits_of, in_space, where_ray_meets
+from app.handles import base_of, in_space, picked, where_ray_meets
 from core.types import Array
 from lessons.kit.lesson import Target
 from lessons.kit.params import Parameter, values
@@ -69,13 +69,14 @@ class Clicks:
     def _follow(self, p: Parameter, origin: Array, through: Array) -> None:
         """Move the point there, or add one."""
         assert self._style is not None
-        current: Any = values(self._params)[p.name]
-        start = np.array(in_space(current if p.kind == "point" else (0.0, 0.0), self._style))
+        known: Mapping[str, Any] = values(self._params)
+        current = known[p.name]
+        stands = np.add(current, base_of(p, known)) if p.kind == "point" else (0.0, 0.0)
+        start = np.array(in_space(stands, self._style))
         found = where_ray_meets(p.plane if p.kind == "point" else "xy", start, origin, through)
         if found is None or p.plane == "free":
             return
-        n = len(p.default) if p.kind == "point" else 2  # type: ignore[arg-type]
-        point = tuple(round(float(v), digits_of(p)) + 0.0 for v in found[:n])
+        point = picked(p, found, known)
         if p.kind == "point":
             self._change({p.name: p.nearest(point)})
         elif len(current) >= p.limit:

@@ -67,14 +67,10 @@ class Handles:
             for k, point in enumerate(points):
                 key = f"{name}.{k}" if parameter.kind == "points" else name
                 shown.add(key)
-                at = np.add(point, self._base(parameter))
+                at = np.add(point, base_of(parameter, self._current))
                 self._show(key, k, parameter, space.display(in_space(at, style)), style)
         for key in set(self._balls) - shown:
             self._discard(key)
-
-    def _base(self, parameter: Parameter) -> Any:
-        """What the parameter's point is an offset from."""
-        return self._current[parameter.about] if parameter.about else 0.0
 
     def _show(self, key: str, k: int, parameter: Parameter, at: Array, style: Style) -> None:
         x, y, z = (float(v) for v in at)
@@ -104,8 +100,6 @@ class Handles:
             ball.remove()
 
     def _listen(self, parameter: Parameter, k: int, ball: Any) -> None:
-        digits = digits_of(parameter)
-
         async def dragged(event: Any) -> None:
             self.dragging = event.phase != "end"
             move(event)
@@ -120,9 +114,7 @@ class Handles:
             found = where_ray_meets(parameter.plane, start, origin, through)
             if found is None:
                 return
-            n = len(parameter.default) if parameter.kind == "point" else 2  # type: ignore[arg-type]
-            offset = found[:n] - self._base(parameter)
-            point = tuple(round(float(v), digits) + 0.0 for v in offset)  # no minus zero
+            point = picked(parameter, found, self._current)
             if parameter.kind == "point":
                 self._change({parameter.name: parameter.nearest(point)})
             elif k < len(points := self._current[parameter.name]):
@@ -138,6 +130,13 @@ def in_space(point: Any, style: Style) -> tuple[float, float, float]:
     return (x, y, z[0] if z else (40 * style.pixel if style.layered else 0.0))
 
 
-def digits_of(parameter: Parameter) -> int:
-    """Decimals that resolve about a thousandth of the range."""
-    return max(0, 3 - int(np.floor(np.log10(parameter.high - parameter.low))))
+def base_of(parameter: Parameter, current: Mapping[str, Any]) -> Any:
+    """What the parameter's point is an offset from, among the current values."""
+    return current[parameter.about] if parameter.about else 0.0
+
+
+def picked(parameter: Parameter, place: Array, current: Mapping[str, Any]) -> tuple[float, ...]:
+    """The point that means this place (3,) of the scene, with decimals for about a thousandth of the range."""
+    n = len(parameter.default) if parameter.kind == "point" else 2  # type: ignore[arg-type]
+    digits = max(0, 3 - int(np.floor(np.log10(parameter.high - parameter.low))))
+    return tuple(round(float(v), digits) + 0.0 for v in place[:n] - base_of(parameter, current))  # no minus zero

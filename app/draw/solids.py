@@ -3,9 +3,9 @@
 import numpy as np
 
 from app.draw import primitives as draw
-from app.draw.contours import contour_segments
 from app.draw.primitives import Primitive, Style
 from core.gaussian import chi_square_level
+from core.level_lines import level_lines
 from core.linalg import sqrt_psd
 from core.rotation import dcm_from_rotation_vector
 from core.types import Array
@@ -80,8 +80,9 @@ def surface(item: scene.Surface, style: Style) -> list[Primitive]:
     vertices = np.stack([xx, yy, z], axis=-1).reshape(-1, 3)
     found = [draw.mesh(item.name, vertices, faces, style.theme.color(item.role), item.opacity, flat=False)]
     pieces = []
-    for level in np.linspace(z.min(), z.max(), item.contours + 2)[1:-1] if item.contours else ():
-        flat = contour_segments(x, y, z, level)
+    drawn = item.contours if np.isfinite(z).all() else 0
+    for level in np.linspace(z.min(), z.max(), drawn + 2)[1:-1]:
+        flat = level_lines(x, y, z, level)
         pieces.append(np.concatenate([flat, np.full((*flat.shape[:-1], 1), level)], axis=-1))
     pairs = np.concatenate(pieces) if pieces else np.zeros((0, 2, 3))
     if len(pairs):

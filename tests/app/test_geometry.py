@@ -8,12 +8,12 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from app.draw.axes import ticks
-from app.draw.contours import contour_segments
 from app.draw.lower import backdrop
 from app.draw.primitives import dashes, style_for
 from app.draw.space import HEIGHT, space_for
 from app.draw.triangulate import triangulate
 from app.theme import LIGHT
+from core.level_lines import level_lines
 from lessons.kit import scene
 from lessons.kit.scene import Orbit, Plane
 
@@ -27,7 +27,7 @@ HILL = np.exp(-((X - 2) ** 2) - (Y[:, None] - 1) ** 2)
 
 def test_contours_of_a_plane_are_exact():
     z = 2 * X + 3 * Y[:, None]
-    found = contour_segments(X, Y, z, 7.1)
+    found = level_lines(X, Y, z, 7.1)
     np.testing.assert_allclose(found @ [2.0, 3.0], 7.1, rtol=1e-12)
     # from y = 3 to y = 0 (x = 3.55) or the border
     np.testing.assert_allclose([found[..., 0].min(), found[..., 0].max()], [0.0, 3.55], atol=1e-9)
@@ -37,14 +37,14 @@ def test_contours_of_a_plane_are_exact():
 
 def test_contours_of_a_bowl_are_circles():
     at = np.linspace(-2.0, 2.0, 81)
-    found = contour_segments(at, at, at**2 + at[:, None] ** 2, 1.0)
+    found = level_lines(at, at, at**2 + at[:, None] ** 2, 1.0)
     np.testing.assert_allclose(np.linalg.norm(found, axis=-1), 1.0, atol=1e-3)
     assert np.linalg.norm(found[:, 1] - found[:, 0], axis=1).sum() == pytest.approx(2 * np.pi, rel=1e-2)
 
 
 @pytest.mark.parametrize("level", [-1.0, 2.0])
 def test_no_contours_outside_the_range(level):
-    assert contour_segments(X, Y, HILL, level).shape == (0, 2, 2)
+    assert level_lines(X, Y, HILL, level).shape == (0, 2, 2)
 
 
 @properties
@@ -52,7 +52,7 @@ def test_no_contours_outside_the_range(level):
 def test_contours_are_closed_or_end_at_the_border(seed, level):
     """Every end is shared by two segments, or lies on the border: also where whole numbers hit the level exactly."""
     z = np.random.default_rng(seed).integers(-2, 4, (6, 7)).astype(float)
-    found = contour_segments(np.arange(7.0), np.arange(6.0), z, level)
+    found = level_lines(np.arange(7.0), np.arange(6.0), z, level)
     assert np.isfinite(found).all()
     ends: dict[tuple[float, ...], int] = {}
     for segment in np.round(found, 9):
