@@ -6,6 +6,7 @@ from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from core.types import Array
 
@@ -42,6 +43,16 @@ class Summary(NamedTuple):
 def equal_weights(N: int) -> tuple[Array, Array]:
     """w = 1/N and log w, each one number seen N times (read-only, no memory)."""
     return np.broadcast_to(1.0 / N, N), np.broadcast_to(-np.log(N), N)
+
+
+def thinned(N: int, most: int) -> NDArray[np.intp]:
+    """floor((2 i + 1) N / (2 M)), i = 0..M-1: of N numbers at most `most`, the middle of each of M equal stretches.
+
+    >>> thinned(10, 3).tolist(), thinned(3, 10).tolist()
+    ([1, 5, 8], [0, 1, 2])
+    """
+    M = min(N, most)
+    return ((2 * np.arange(M) + 1) * N) // (2 * M)
 
 
 def log_weights(w: Array) -> tuple[Array | float, float]:

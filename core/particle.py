@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from core.blocks import LONG, for_each, spans
 from core.checks import covariance, finite
-from core.cloud import AllWeightsZero, Piece, combine, equal_weights, log_weights, weigh
+from core.cloud import AllWeightsZero, Piece, combine, equal_weights, log_weights, thinned, weigh
 from core.linalg import cholesky_psd
 from core.noise import standard_normal, stream, stream_key
 from core.proposals import Proposal, block_proposal
@@ -127,8 +127,8 @@ def run(
     if subsample < 1:
         raise ValueError(f"subsample: expected a positive number, got {subsample}")
     x = _start(initial, n_particles, rng, threads)
-    N, M, T = len(x), min(len(x), subsample), len(ys)
-    index = ((2 * np.arange(M) + 1) * N) // (2 * M)        # the middle of each of M equal stretches
+    N, T = len(x), len(ys)
+    index = thinned(N, subsample)
     w, log_w = equal_weights(N)[0], None
     summaries, clouds, kept, first, last = [], [], [], x[index], None
     for k, y in enumerate(ys):

@@ -8,10 +8,10 @@ from typing import NamedTuple
 import numpy as np
 
 from core.indoor.graph import FloorGraph
-from core.indoor.kalman_filters import Grid, Track, cpkf, cvkf, position_fixes
+from core.indoor.kalman_filters import Grid, cpkf, cvkf, position_fixes
 from core.indoor.routes import Truth, random_stops, walk_route
 from core.indoor.signal import AccessPoints
-from core.indoor.simulate import simulate_scans
+from core.indoor.simulate import heard, simulate_scans
 from core.indoor.tracking import run
 from core.indoor.walk import Walk
 from core.types import Array, Gaussian
@@ -55,12 +55,17 @@ def fix_law(graph: FloorGraph, points: AccessPoints, grid: Grid, seed: int = 0, 
 
     rng = np.random.default_rng([seed, size])
     cloud = scatter(graph, size, rng)
-    y = points.expected(cloud.position_m, cloud.floor) + points.sigma_db * rng.standard_normal((size, len(points)))
-    y[y < points.threshold_dbm] = np.nan
-    heard = ~np.isnan(y).all(axis=1)
-    fixes = position_fixes(y[heard], points, grid)
-    e = fixes.xy_m - cloud.position_m[heard, :2]
-    return FixLaw(e.T @ e / len(e), float((fixes.floor == cloud.floor[heard]).mean()))
+    y = heard(points, points.expected(cloud.position_m, cloud.floor), rng)
+    some = ~np.isnan(y).all(axis=1)
+    fixes = position_fixes(y[some], points, grid)
+    e = fixes.xy_m - cloud.position_m[some, :2]
+    return FixLaw(e.T @ e / len(e), float((fixes.floor == cloud.floor[some]).mean()))
+
+
+def anywhere(grid: Grid) -> Gaussian:
+    """What the Kalman filters believe at the start: the middle of the grid, half its width as standard deviation."""
+    low, high = np.array(grid.low_m), np.array(grid.high_m)
+    return Gaussian(0.5 * (low + high), np.diag(np.square(0.5 * (high - low))))
 
 
 def compare(
@@ -101,7 +106,8 @@ def compare(
             xy, floor = r.projected, r.floor
         else:
             R = fix_law(graph, points, grid).R if R is None else R
-            track = _kalman(name, scans, points, grid, R, dt_s, q_cp if name == "cpkf" else q_cv)
+            track = (cpkf(scans, points, grid, anywhere(grid), dt_s=dt_s, q=q_cp, R=R) if name == "cpkf" else
+                     cvkf(scans, points, grid, anywhere(grid), dt_s=dt_s, q=q_cv, R=R))
             xy, floor = track.xy_m, track.floor
         seconds = (time.perf_counter() - begun) / len(scans)
         errors = np.sqrt(np.square(xy - truth.position_m[:, :2]).sum(axis=1))
@@ -109,10 +115,3 @@ def compare(
         if progress:
             progress((k + 1) / len(filters))
     return found
-
-
-def _kalman(name: str, scans: Array, points: AccessPoints, grid: Grid, R: Array, dt_s: float,
-            q: float) -> Track:
-    low, high = np.array(grid.low_m), np.array(grid.high_m)
-    start = Gaussian(0.5 * (low + high), np.diag(np.square(0.5 * (high - low))))
-    return (cpkf if name == "cpkf" else cvkf)(scans, points, grid, start, dt_s=dt_s, q=q, R=R)

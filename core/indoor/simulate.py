@@ -21,7 +21,15 @@ def simulate_scans(
         raise ValueError(f"interval_s: expected a positive number of seconds, got {interval_s}")
     count = np.floor(truth.time_s / interval_s + 1e-9)
     scanned = np.diff(count, prepend=-1.0) > 0.0
-    shape = (len(truth.time_s), len(points))
-    noise = rng.standard_normal(shape) if points.freedom is None else rng.standard_t(points.freedom, shape)
-    y = points.expected(truth.position_m, truth.floor) + points.sigma_db * noise
-    return np.where(scanned[:, None] & (y >= points.threshold_dbm), y, np.nan)
+    y = heard(points, points.expected(truth.position_m, truth.floor), rng)
+    return np.where(scanned[:, None], y, np.nan)
+
+
+def heard(points: AccessPoints, mean_dbm: Array, rng: "np.random.Generator") -> Array:
+    """y_a = mu_a + w,  w ~ N(0, sigma_a^2), or Student t with `points.freedom`; NaN below points.threshold_dbm.
+
+    mean_dbm (..., m): what is expected where the scans are made -> (..., m).
+    """
+    freedom, shape = points.freedom, mean_dbm.shape
+    y = mean_dbm + points.sigma_db * (rng.standard_normal(shape) if freedom is None else rng.standard_t(freedom, shape))
+    return np.where(y >= points.threshold_dbm, y, np.nan)

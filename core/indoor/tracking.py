@@ -6,6 +6,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from core.cloud import thinned
 from core.indoor.cloud import Cloud, Numbers, gather
 from core.indoor.filter import Belief, Recovery, Step, start, step
 from core.indoor.graph import FloorGraph, Id
@@ -72,8 +73,7 @@ def run(
         raise ValueError(f"dt_s: expected a positive number of seconds, got {dt_s}")
     belief = start(graph, n_particles, rng, walk) if belief is None else belief
     N, T = len(belief.log_weights), len(scans)
-    M = min(N, subsample)
-    index = ((2 * np.arange(M) + 1) * N) // (2 * M)        # the middle of each of M equal stretches
+    index = thinned(N, subsample)
     steps, kept = [], []
     thin_before = _thin_belief(belief, index)
     for k, y in enumerate(scans):

@@ -8,8 +8,8 @@ from core.gaussian import affine
 from core.grid_estimates import mean_square_error
 from core.linear_update import map_cost
 from core.types import Array, Gaussian
-from lessons.bayes_kalman._random_walk_scene import clipped
 from lessons.kit import figures as fig
+from lessons.kit.curves import clipped, square
 from lessons.kit.equations import Equation, Piece
 from lessons.kit.lesson import Moment, Readout, View
 from lessons.kit.roles import Role
@@ -122,7 +122,7 @@ def _told(r: "Result", box: Box) -> list[Item]:
     along = np.array([-H[0, 1], H[0, 0]]) * 40.0
     lines = [np.array([normal * value - along, normal * value + along]) for value in
              (r.y[0], r.y[0] - np.sqrt(R[0, 0]), r.y[0] + np.sqrt(R[0, 0]))]
-    middle, *edges = [clipped(line, box.middle, box.half) for line in lines]
+    middle, *edges = [clipped(line, square(box.middle, box.half)) for line in lines]
     found: list[Item] = []
     if len(middle):
         found += [Segments("told", middle, role="measurement", width=4), Label("told_label", "Hx = y", middle[0, 0])]

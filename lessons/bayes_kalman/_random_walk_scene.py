@@ -6,6 +6,7 @@ import numpy as np
 
 from core.gaussian import chi_square_level, ellipse
 from core.types import Array, Gaussian
+from lessons.kit.curves import clipped, square
 from lessons.kit.lesson import Moment
 from lessons.kit.roles import Role
 from lessons.kit.scene import Item, Label, LevelEllipse, Plane, Points, Polyline, Segments
@@ -104,7 +105,7 @@ def _through(glass: Glass, name: str, t: "Track", r: "Result", path: Array, at: 
     if len(near):
         items.append(Points(f"{name}_measurements", glass.to_scene(near), role="measurement", size=7, fade=0.35))
     for key, line, width, of in (("truth", r.truth, 2.0, "truth"), ("path", path, 4.0, role)):
-        pieces = clipped(line, glass.centre, glass.half)
+        pieces = clipped(line, square(glass.centre, glass.half))
         if len(pieces):
             items.append(Segments(f"{name}_{key}", glass.to_scene(pieces), role=of, width=width))
     early = k > 0 and at.stage < UPDATE
@@ -129,7 +130,7 @@ def _ellipse(glass: Glass, name: str, g: Gaussian, role: Role, early: bool) -> l
     rim = ellipse(g, chi_square_level(0.68, 2))
     if glass.inside(rim).all():
         return [LevelEllipse(name, glass.law(g), role=role, dashed=early, filled=not early)]
-    pieces = clipped(rim, glass.centre, glass.half)
+    pieces = clipped(rim, square(glass.centre, glass.half))
     return [Segments(name, glass.to_scene(pieces), role=role, width=3)] if len(pieces) else []
 
 
@@ -151,17 +152,3 @@ def _ruler(a: Layout) -> list[Item]:
 def point_of(r: "Result", k: int) -> int:
     """The point of the walk that the estimate of step k is about."""
     return max(k - 1 + r.offset, 0)
-
-
-def clipped(line: Array, centre: Array, half: float) -> Array:
-    """The parts of a connected line (n, 2) within a square: segments (s, 2, 2).  Liang and Barsky's rule."""
-    start, step = line[:-1] - centre, np.diff(line, axis=0)
-    moving = np.abs(step) > 1e-12
-    safe = np.where(moving, step, 1.0)
-    ends = np.sort([(-half - start) / safe, (half - start) / safe], axis=0)
-    within = np.abs(start) <= half
-    enter = np.where(moving, ends[0], np.where(within, -np.inf, np.inf)).max(axis=1).clip(0.0, None)
-    leave = np.where(moving, ends[1], np.where(within, np.inf, -np.inf)).min(axis=1).clip(None, 1.0)
-    kept = enter < leave
-    at = np.stack([enter, leave], axis=1)[kept, :, None]
-    return centre + start[kept, None] + at * step[kept, None]

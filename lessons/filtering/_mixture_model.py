@@ -9,7 +9,9 @@ from core.forms import half_space_probability
 from core.mixture import Mixture, MixtureStep, Upkeep
 from core.sensors import Range
 from core.types import Array, Gaussian
+from lessons.filtering._histogram import weighted_density
 from lessons.filtering._lab_worlds import STEPS, World, world
+from lessons.filtering._with_start import with_start
 from lessons.kit.lesson import Progress
 
 if TYPE_CHECKING:
@@ -58,17 +60,17 @@ def run_filters(p: "Params", progress: Progress) -> Track:
     pf = particle.run(
         w.initial, y, w.motion, sensor, p.n_particles, draw, subsample=DRAWN,
         keep=lambda k, step: (float(step.weights_before[step.predicted[:, 1] > 0.0].sum()),
-                              _histogram(step.predicted[:, 1], step.weights_before)),
+                              weighted_density(step.predicted[:, 1], step.weights_before, EDGES)),
         progress=lambda done: progress(0.7 + 0.3 * done))
     shares, histograms = zip(*pf.kept, strict=True)
     start = pf.initial[:, 1]
     equal = np.full(len(start), 1.0 / len(start))
-    ekf = _with_start(w.initial, ekf)
+    ekf = with_start(w.initial, ekf)
     return Track(
-        w.stations, truth[:, :2], y, run.initial, run.steps, _with_start(w.initial, Gaussian(run.means, run.covs)),
-        ekf, _with_start(w.initial, Gaussian(pf.mean, pf.cov)),
+        w.stations, truth[:, :2], y, run.initial, run.steps, with_start(w.initial, Gaussian(run.means, run.covs)),
+        ekf, with_start(w.initial, Gaussian(pf.mean, pf.cov)),
         np.concatenate([pf.initial[None, :, :2], pf.predicted[..., :2]]), np.vstack([equal, pf.weights_before]),
-        np.vstack([_histogram(start, equal), *histograms]),
+        np.vstack([weighted_density(start, equal, EDGES), *histograms]),
         np.array([share_above(run.initial), *(share_above(s.update.posterior) for s in run.steps)]),
         _above(ekf), np.array([float((start > 0.0).mean()), *shares]))
 
@@ -104,14 +106,3 @@ def straight(w: World) -> Array:
 
 def _above(g: Gaussian) -> Array:
     return 1.0 - half_space_probability(g, BELOW, 0.0)
-
-
-def _histogram(x: Array, w: Array) -> Array:
-    """Weighted density over EDGES; what lies beyond them is left out.  Much faster than numpy's."""
-    bins, width = len(EDGES) - 1, EDGES[1] - EDGES[0]
-    place = np.clip((x - EDGES[0]) / width, -1.0, bins) + 1.0
-    return np.bincount(place.astype(np.intp), weights=w, minlength=bins + 2)[1:-1] / width
-
-
-def _with_start(start: Gaussian, g: Gaussian) -> Gaussian:
-    return Gaussian(np.vstack([start.mean, g.mean]), np.concatenate([start.cov[None], g.cov]))

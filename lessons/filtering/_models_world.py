@@ -11,6 +11,7 @@ from core.motion import LinearMotion, constant_velocity
 from core.sensors import Position
 from core.turn import known_turn, standing
 from core.types import Array, Gaussian
+from lessons.filtering._with_start import with_start
 from lessons.kit.lesson import Progress
 
 if TYPE_CHECKING:
@@ -80,8 +81,8 @@ def run_filters(p: "Params", progress: Progress) -> Result:
     transition = imm.sojourn_transition([p.stay_stand_s, p.stay_drive_s, p.stay_turn_s])
     start = imm.bank(initial, np.full(3, 1.0 / 3.0))
     run = imm.run(start, y, models, transition, sensor, progress=lambda done: progress(0.3 * done))
-    alone = tuple(_with_start(initial, kalman.run(initial, y, m, sensor).posterior) for m in models)
-    combined = _with_start(initial, run.estimate)
+    alone = tuple(with_start(initial, kalman.run(initial, y, m, sensor).posterior) for m in models)
+    combined = with_start(initial, run.estimate)
     ys = truth[1:, None, :2] + p.sigma_m * more.standard_normal((STEPS, RUNS, 2))
     many = imm.run(start, ys, models, transition, sensor, progress=lambda done: progress(0.3 + 0.5 * done))
     noise_rmse = []
@@ -98,7 +99,3 @@ def run_filters(p: "Params", progress: Progress) -> Result:
 def _rmse(means: Array, truth: Array) -> float:
     """Over all runs and seconds, of the position: means (STEPS, RUNS, 4)."""
     return float(metrics.rmse(means[..., :2], np.broadcast_to(truth[1:, None, :2], (*means.shape[:-1], 2))))
-
-
-def _with_start(start: Gaussian, g: Gaussian) -> Gaussian:
-    return Gaussian(np.vstack([start.mean, g.mean]), np.concatenate([start.cov[None], g.cov]))

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from core.cloud import thinned
 from core.types import Array, Gaussian
 from lessons.filtering import _monte_carlo_problems as problems
 from lessons.kit import figures as fig
@@ -44,10 +45,6 @@ def _note(p: "Params", r: "Result", n: int) -> str:
     return " ".join(found)
 
 
-def _some(n: int) -> Array:
-    return np.arange(n) if n <= DRAWN else ((2 * np.arange(DRAWN) + 1) * n) // (2 * DRAWN)
-
-
 def _curves(p: "Params", r: "Result", at: Moment, n: int) -> tuple[list[Item], Plane]:
     """Below: the integrand g and the density f with its samples.  Above: the terms h = g/f and their mean."""
     fine = np.linspace(-3.2, 3.2, 321)
@@ -67,7 +64,7 @@ def _curves(p: "Params", r: "Result", at: Moment, n: int) -> tuple[list[Item], P
         Polyline("g", below.place(np.column_stack([fine, problems.target(p, fine[:, None])])), role="truth", width=3.5),
         Polyline("f", below.place(np.column_stack([fine, f])), role="prior", width=3.5),
     ]
-    some = _some(n)
+    some = thinned(n, DRAWN)
     z, h = r.z[some, 0], r.h[some]
     shown = np.abs(z) < 3.2
     # Spread over the height below f, the samples fill its area evenly.
@@ -102,7 +99,7 @@ def _square(p: "Params", r: "Result", at: Moment, n: int) -> tuple[list[Item], P
         HeatMap("law", axis, axis, bell, role="prior", opacity=0.35),
         Polygon("rectangle", [(x0, y0), (x1, y0), (x1, y1), (x0, y1)], role="likelihood", opacity=0.14),
     ]
-    some = _some(n)
+    some = thinned(n, DRAWN)
     z, h = r.z[some], r.h[some]
     shown, kept = (np.abs(z) < 3.4).all(axis=1), h > 0.0
     if at.stage == DRAW:

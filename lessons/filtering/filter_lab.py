@@ -15,6 +15,7 @@ from core.mixture import run as run_mixture
 from core.types import Array, Gaussian
 from lessons.filtering._lab_view import view
 from lessons.filtering._lab_worlds import NAMES, STEPS, World, world
+from lessons.filtering._with_start import with_start
 from lessons.kit.lesson import Lesson, Progress, Timeline
 from lessons.kit.params import choice, seed, slider, switch
 
@@ -141,7 +142,7 @@ def filters(p: Params, w: World) -> dict[str, study.Filter]:
 
 
 def _track(w: World, law: Gaussian, states: Array, work: float) -> Track:
-    whole = Gaussian(np.vstack([w.initial.mean, law.mean]), np.concatenate([w.initial.cov[None], law.cov]))
+    whole = with_start(w.initial, law)
     here = Gaussian(whole.mean[:, :2], whole.cov[:, :2, :2])
     error = np.sqrt(np.square(here.mean - states[:, :2]).sum(axis=1))
     return Track(whole, error, metrics.nees(here, states[:, :2]), work)

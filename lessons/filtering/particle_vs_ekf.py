@@ -10,11 +10,14 @@ from typing import NamedTuple
 import numpy as np
 
 from core import extended, particle, unscented
+from core.cloud import thinned
 from core.forms import half_space_probability
 from core.motion import constant_velocity
 from core.sensors import Range
 from core.types import Array, Gaussian
+from lessons.filtering._histogram import weighted_density
 from lessons.filtering._particle_view import CARRIER, view
+from lessons.filtering._with_start import with_start
 from lessons.kit.lesson import Lesson, Progress, Timeline
 from lessons.kit.params import Point, choice, draggable, seed, slider, switch
 
@@ -113,7 +116,7 @@ def compute(p: Params, progress: Progress) -> Result:
         d = side.distance(step.predicted)
         w = step.weights_before
         heavy = np.setdiff1d(np.flatnonzero(w > CARRIER), index)
-        return Kept(float(w @ (d > 0.0)), _histogram(d, w, edges),
+        return Kept(float(w @ (d > 0.0)), weighted_density(d, w, edges),
                     np.bincount(step.ancestors, minlength=len(d))[index], float(w[index].max()),
                     step.predicted[heavy], w[heavy])
 
@@ -126,16 +129,15 @@ def compute(p: Params, progress: Progress) -> Result:
     w0 = np.full(len(d0), 1.0 / len(d0))
     slim = run._replace(last=None, kept=())                 # the full cloud would fill the cache of results
     return Result(
-        stations, y, sensor.h(run.predicted), side, edges, _with_start(ekf), _with_start(ukf),
-        _with_start(Gaussian(run.mean, run.cov)), slim, np.append(float(w0 @ (d0 > 0.0)), share),
-        np.vstack([_histogram(d0, w0, edges), density]), children, heaviest,
+        stations, y, sensor.h(run.predicted), side, edges, with_start(INITIAL, ekf), with_start(INITIAL, ukf),
+        with_start(INITIAL, Gaussian(run.mean, run.cov)), slim, np.append(float(w0 @ (d0 > 0.0)), share),
+        np.vstack([weighted_density(d0, w0, edges), density]), children, heaviest,
         carriers, carried, TRUTH)
 
 
 def drawn_index(N: int) -> Array:
-    """The numbers of the particles that `core.particle.run` keeps: the middle of each of M equal stretches."""
-    M = min(N, DRAWN)
-    return ((2 * np.arange(M) + 1) * N) // (2 * M)
+    """The numbers of the particles that `core.particle.run` keeps."""
+    return thinned(N, DRAWN)
 
 
 def _side(stations: Array) -> Side:
@@ -145,17 +147,6 @@ def _side(stations: Array) -> Side:
     normal = np.array([-along[1], along[0]]) / length if length > 0.0 else np.array([0.0, 1.0])
     normal = -normal if normal[1] < 0.0 else normal
     return Side(normal, float(normal @ stations[0]))
-
-
-def _histogram(d: Array, w: Array, edges: Array) -> Array:
-    """Weighted relative frequency over the bin width; what lies outside the edges is left out."""
-    width = edges[1] - edges[0]
-    bins = np.clip((d - edges[0]) / width, -1.0, BINS) + 1.0
-    return np.bincount(bins.astype(np.intp), weights=w, minlength=BINS + 2)[1:-1] / width
-
-
-def _with_start(g: Gaussian) -> Gaussian:
-    return Gaussian(np.vstack([INITIAL.mean, g.mean]), np.concatenate([INITIAL.cov[None], g.cov]))
 
 
 def timeline(p: Params) -> Timeline:

@@ -1,10 +1,13 @@
 """A walk through the building and four filters on the same scans, thinned to what can be drawn."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
 
+from core.cloud import thinned
 from core.indoor import (
     AccessPoints,
     FloorGraph,
@@ -17,10 +20,11 @@ from core.indoor import (
     simulate_scans,
     walk_route,
 )
-from core.indoor.comparison import candidates, fix_law
+from core.indoor.comparison import anywhere, candidates, fix_law
 from core.indoor.filter import Step
 from core.indoor.point_estimates import density_mode, medoid, nearest_particle
-from core.types import Array, Gaussian
+from core.types import Array
+from lessons.indoor._building import building
 from lessons.kit.lesson import Progress
 
 DRAWN, JUDGED = 800, 300        # particles that are drawn, and that the slower point estimates look at
@@ -86,7 +90,7 @@ def scanned(truth: Truth, points: AccessPoints, interval_s: float, seed: int) ->
 def graph_filter(graph: FloorGraph, scans: Array, points: AccessPoints, walk: Walk, n: int, threshold: float,
                  estimate: str, seed: int, progress: Progress) -> GraphTrack:
     """The graph-based particle filter with everything that is drawn of it."""
-    index, judged = (((2 * np.arange(min(n, m)) + 1) * n) // (2 * min(n, m)) for m in (DRAWN, JUDGED))
+    index, judged = thinned(n, DRAWN), thinned(n, JUDGED)
 
     def keep(k: int, s: Step) -> tuple[Array, ...]:
         w = s.weights_before[index]
@@ -114,13 +118,18 @@ def _point(s: Step, estimate: str, judged: Array) -> Array:
     return xy[choose(xy, w)]
 
 
-def kalman_tracks(graph: FloorGraph, scans: Array, points: AccessPoints, q_cv: float,
+@lru_cache(maxsize=16)
+def fix_error(map_key: str, technology: str, sigma_db: float) -> Array:
+    """R of `fix_law` (2, 2); kept, as it costs as much as a fifth of the lesson and depends on these alone."""
+    b = building(map_key)
+    return fix_law(b.graph, replace(b.transmitters[technology], sigma_db=sigma_db), candidates(b.graph)).R
+
+
+def kalman_tracks(graph: FloorGraph, scans: Array, points: AccessPoints, R: Array, q_cv: float,
                   q_cp: float) -> dict[str, KalmanTrack]:
     """CVKF and CPKF on position fixes of the same scans; they do not know the map."""
     grid = candidates(graph)
-    R = fix_law(graph, points, grid).R
-    low, high = np.array(grid.low_m), np.array(grid.high_m)
-    start = Gaussian(0.5 * (low + high), np.diag(np.square(0.5 * (high - low))))
+    start = anywhere(grid)
     if np.isnan(scans).all():
         still = KalmanTrack(np.tile(start.mean, (len(scans), 1)), np.full(len(scans), graph.floors[0]),
                             np.tile(start.cov, (len(scans), 1, 1)))

@@ -15,6 +15,7 @@ from lessons.indoor._graph_filter_model import (
     ESTIMATES,
     GraphTrack,
     KalmanTrack,
+    fix_error,
     graph_filter,
     kalman_tracks,
     route_of,
@@ -90,7 +91,8 @@ def compute(p: Params, progress: Progress) -> Result:
     if p.others:
         equal = graph_filter(g, scans, points, replace(walk, rule="equal"), p.particles, p.threshold, p.estimate,
                              p.seed, lambda f: progress(0.5 + 0.48 * f))
-        kalman = kalman_tracks(g, scans, points, Q_CV, Q_CP)
+        R = fix_error(p.map, p.technology, p.sigma_db)
+        kalman = kalman_tracks(g, scans, points, R, Q_CV, Q_CP)
         tracks |= {"equal": equal.xy_m, **{name: k.xy_m for name, k in kalman.items()}}
         floors |= {"equal": equal.floor, **{name: k.floor for name, k in kalman.items()}}
     errors = {name: np.sqrt(np.square(xy - truth.position_m[:, :2]).sum(axis=1)) for name, xy in tracks.items()}

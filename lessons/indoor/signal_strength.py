@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from core.indoor import AccessPoints, radio_map
+from core.indoor.simulate import heard
 from core.types import Array
 from lessons.indoor._building import MAP, Building, building
 from lessons.indoor._signal_model import Shadows, changed, likelihoods, shadows
@@ -78,8 +79,7 @@ def compute(p: Params, progress: Progress) -> Result:
     at = np.array([*p.truth, g.floor_height_m * floor])
     expected = points.expected(at, floor)
     shade: Shadows = shadows(len(points), p.shadow_db, rng)
-    y = expected + shade.at(at[:2]) + points.sigma_db * rng.standard_normal(len(points))
-    y[y < points.threshold_dbm] = np.nan
+    y = heard(points, expected + shade.at(at[:2]), rng)
     order = np.argsort(-np.where(np.isnan(y), -np.inf, y), kind="stable")[:int((~np.isnan(y)).sum())]
     progress(0.1)
     shown = radio_map(g, points, floor, cell_m=CELL_M)

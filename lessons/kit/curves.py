@@ -44,6 +44,11 @@ def tangent_line(x: Array, missing: float, slope: Array, reach: float) -> Array:
     return np.array([foot - reach * along, foot + reach * along])
 
 
+def square(centre: Array, half: float) -> Array:
+    """The box (2, 2) of the points within `half` of the centre in both coordinates."""
+    return np.array([centre - half, centre + half])
+
+
 def clipped(points: Array, box: Array) -> Array:
     """The pieces (n, 2, 2) of a polyline that lie in the box (2, 2), cut at its walls."""
     if len(points) < 2:

@@ -9,8 +9,9 @@ from core import mixture as core_mixture
 from core.gaussian import log_density
 from core.types import Gaussian
 from lessons.filtering import _cutting, _mixture_tree, mixture
+from lessons.filtering._histogram import weighted_density
 from lessons.filtering._mixture_drawing import density, shown
-from lessons.filtering._mixture_model import EDGES, _histogram, side
+from lessons.filtering._mixture_model import EDGES, side
 from lessons.kit.scene import HeatMap, Label, LevelEllipse, Particles, Points, Polyline, Segments
 from tests.lessons.support import Desk, typeset
 from tests.oracle import entry
@@ -167,7 +168,8 @@ def test_the_fill_is_the_density():
 def test_the_histogram_is_numpy_s():
     rng = np.random.default_rng(0)
     x, w = rng.normal(0.0, 80.0, 5000), rng.random(5000)
-    np.testing.assert_allclose(_histogram(x, w), np.histogram(x, EDGES, weights=w)[0] / (EDGES[1] - EDGES[0]))
+    expected = np.histogram(x, EDGES, weights=w)[0] / (EDGES[1] - EDGES[0])
+    np.testing.assert_allclose(weighted_density(x, w, EDGES), expected)
 
 
 def test_exercise_3_11_has_the_oracle_s_numbers():

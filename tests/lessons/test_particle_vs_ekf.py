@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from lessons.filtering import particle_vs_ekf as lesson
+from lessons.filtering._histogram import weighted_density
 from lessons.kit.lesson import Cancelled, Moment, no_progress
 from lessons.kit.params import parameters
 from tests.lessons.support import Desk, check_formulas, check_plots, names
@@ -100,7 +101,7 @@ def test_the_histogram_is_numpy_s():
     d, w, edges = rng.normal(0, 80, 5000), rng.random(5000), np.linspace(-150, 150, lesson.BINS + 1)
     w /= w.sum()
     expected = np.histogram(d, edges, weights=w)[0] / (edges[1] - edges[0])
-    np.testing.assert_allclose(lesson._histogram(d, w, edges), expected, atol=1e-12)
+    np.testing.assert_allclose(weighted_density(d, w, edges), expected, atol=1e-12)
 
 
 def test_stages_show_weights_and_ancestors():
